@@ -1,0 +1,2 @@
+//! The `truedepth` command.
+fn main() {}

@@ -1,0 +1,29 @@
+//! A position in an image.
+
+/// A position in an image, in pixels; integer coordinates are pixel *centres*, x to the right, y down.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pixel {
+    /// Column, pixels.
+    pub x: f64,
+    /// Row, pixels.
+    pub y: f64,
+}
+
+impl Pixel {
+    /// The position at column `x`, row `y`.
+    pub const fn new(x: f64, y: f64) -> Self {
+        Self { x, y }
+    }
+
+    /// Euclidean distance, pixels.
+    pub fn distance(self, other: Self) -> f64 {
+        (self.x - other.x).hypot(self.y - other.y)
+    }
+}
+
+impl std::ops::Sub for Pixel {
+    type Output = [f64; 2];
+    fn sub(self, other: Self) -> [f64; 2] {
+        [self.x - other.x, self.y - other.y]
+    }
+}

@@ -1,0 +1,16 @@
+//! Grey, colour and depth images, and how to sample them.
+//!
+//! Images are row-major with the origin at the centre of the top-left pixel. A [`DepthMap`] holds metres, and NaN
+//! where nothing was measured: never 0, so that arithmetic cannot mistake a hole for a distance.
+//!
+//! Not here: files (bytes in, bytes out in `codec`), what the pixels show.
+
+mod codec;
+mod depth_map;
+mod gray;
+mod rgb;
+
+pub use codec::{Error, Limits};
+pub use depth_map::DepthMap;
+pub use gray::Gray;
+pub use rgb::Rgb;

@@ -1,0 +1,63 @@
+//! Is the depth of an Apple TrueDepth recording true? And if not, what exactly is wrong, by how much, how sure are
+//! we, and what fixes it?
+//!
+//! The library is a house of rooms, listed here from the ground to the roof. **A room uses only rooms listed above
+//! it**; `tests/it/tidy.rs` fails otherwise. Nothing in here prints, exits, reads arguments, the clock, the
+//! environment or the network; only [`recording`] opens files, and only with the default feature `fs`.
+//!
+//! The flow of data is the flow of types: [`recording::Recording`] → [`detect::Observation`] → [`pose::View`] →
+//! [`calibrate::Calibration`] → [`depth::BoardDepth`] → [`diagnose::Finding`] → [`report::wire`].
+//!
+//! Conventions (pixel centres at integers, metres, NaN for "no measurement", `a_from_b`) are stated once, in
+//! `CONVENTIONS.md`.
+
+// Ground: shapes and numbers.
+
+/// Points, pixels, poses and homographies, with frames as types.
+pub mod geom;
+
+/// Least squares, robust losses, covariance and statistics; knows no cameras.
+pub mod solve;
+
+// What exists.
+
+/// Grey, colour and depth images, and how to sample them.
+pub mod image;
+
+/// Camera models: one file per model.
+pub mod camera;
+
+/// The printed target: dictionaries and ChArUco geometry.
+pub mod board;
+
+// What was seen.
+
+/// Recordings as the capture apps write them: frames paired by time, factory metadata, limits.
+pub mod recording;
+
+/// ChArUco corners of an image, each with its own uncertainty.
+pub mod detect;
+
+// What follows.
+
+/// Where the board stood in front of the camera.
+pub mod pose;
+
+/// Intrinsics from many views, with uncertainties.
+pub mod calibrate;
+
+/// Sensor depth against the depth of the board.
+pub mod depth;
+
+// Judgement.
+
+/// Findings: what is wrong, by how much, how sure.
+pub mod diagnose;
+
+// What leaves.
+
+/// Synthetic recordings with ground truth and chosen faults.
+pub mod simulate;
+
+/// What leaves the library: JSON, HTML, SVG.
+pub mod report;
