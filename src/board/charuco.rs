@@ -68,16 +68,24 @@ impl CharucoBoard {
             return fail(format!("{squares_x}x{squares_y} squares; each side takes 2 to 100"));
         }
         if squares_x * squares_y < 6 {
-            return fail(format!("{squares_x}x{squares_y} squares have a single inner corner; take at least 3x2"));
+            return fail(format!(
+                "{squares_x}x{squares_y} squares have a single inner corner; take at least 3x2"
+            ));
         }
         if !(1e-4..=10.0).contains(&square_m) {
             return fail(format!("a square of {square_m} m; it must lie between 0.1 mm and 10 m"));
         }
         if !(marker_m > 0.0 && marker_m < square_m) {
-            return fail(format!("a marker of {marker_m} m does not fit into a square of {square_m} m"));
+            return fail(format!(
+                "a marker of {marker_m} m does not fit into a square of {square_m} m"
+            ));
         }
         let board = Self { squares_x, squares_y, square_m, marker_m, dictionary, layout: None };
-        let n_markers = [Layout::Legacy, Layout::New].map(|l| board.markers(l).len()).into_iter().max().unwrap_or(0);
+        let n_markers = [Layout::Legacy, Layout::New]
+            .map(|l| board.markers(l).len())
+            .into_iter()
+            .max()
+            .unwrap_or(0);
         if board.dictionary.len() < n_markers {
             return fail(format!(
                 "{} has {} markers, {squares_x}x{squares_y} squares need {n_markers}",
@@ -135,7 +143,8 @@ impl CharucoBoard {
     /// The marker of the white square at (`column`, `row`): how many white squares come before it.
     fn marker_id(&self, layout: Layout, column: usize, row: usize) -> usize {
         // In a row that starts white, ⌈c/2⌉ of the first c squares are white; in one that starts black, ⌊c/2⌋.
-        let whites = |row: usize, columns: usize| (columns + usize::from(self.is_white(layout, 0, row))) / 2;
+        let whites =
+            |row: usize, columns: usize| (columns + usize::from(self.is_white(layout, 0, row))) / 2;
         let pairs = row / 2 * self.squares_x; // Two neighbouring rows have squares_x white squares together.
         pairs + if row % 2 == 1 { whites(row - 1, self.squares_x) } else { 0 } + whites(row, column)
     }
@@ -154,7 +163,8 @@ impl CharucoBoard {
         let side = self.marker_m / self.square_m;
         let margin = (1.0 - side) / 2.0;
         let cells = (self.dictionary.bits() + 2) as f64;
-        let (mu, mv) = ((u - column as f64 - margin) / side * cells, (v - row as f64 - margin) / side * cells);
+        let (mu, mv) =
+            ((u - column as f64 - margin) / side * cells, (v - row as f64 - margin) / side * cells);
         if !(mu >= 0.0 && mv >= 0.0 && mu < cells && mv < cells) {
             return Some(true);
         }
@@ -175,7 +185,9 @@ impl FromStr for CharucoBoard {
             [squares, square, marker, dictionary, "legacy"] => {
                 (squares, square, marker, dictionary, Some(Layout::Legacy))
             }
-            [squares, square, marker, dictionary, "new"] => (squares, square, marker, dictionary, Some(Layout::New)),
+            [squares, square, marker, dictionary, "new"] => {
+                (squares, square, marker, dictionary, Some(Layout::New))
+            }
             _ => return Err(form()),
         };
         let (x, y) = squares.split_once(['x', 'X']).ok_or_else(form)?;

@@ -51,7 +51,8 @@ predefined! {
 impl Dictionary {
     /// One of OpenCV's predefined dictionaries, by its name with or without the prefix `DICT_`, in any case.
     pub fn predefined(name: &str) -> Result<Self, Error> {
-        let bare = name.strip_prefix("DICT_").or_else(|| name.strip_prefix("dict_")).unwrap_or(name);
+        let bare =
+            name.strip_prefix("DICT_").or_else(|| name.strip_prefix("dict_")).unwrap_or(name);
         let (name, text, n) = PREDEFINED
             .iter()
             .find(|(known, ..)| known.eq_ignore_ascii_case(bare))
@@ -65,7 +66,10 @@ impl Dictionary {
             .expect("the header tells the size");
         let codes = lines
             .take(*n)
-            .map(|line| u64::from_str_radix(line, 16).expect("the tables shipped with the library are hexadecimal"))
+            .map(|line| {
+                u64::from_str_radix(line, 16)
+                    .expect("the tables shipped with the library are hexadecimal")
+            })
             .collect();
         Ok(Self { name: (*name).to_owned(), bits, codes })
     }

@@ -7,7 +7,9 @@ use super::Error;
 pub fn length_m(text: &str) -> Result<f64, Error> {
     let error = || Error::Length(text.to_owned());
     let trimmed = text.trim();
-    let split = trimmed.find(|c: char| c.is_ascii_alphabetic() && c != 'e' && c != 'E').ok_or_else(error)?;
+    let split = trimmed
+        .find(|c: char| c.is_ascii_alphabetic() && c != 'e' && c != 'E')
+        .ok_or_else(error)?;
     let (number, unit) = trimmed.split_at(split);
     let metres_per_unit = match unit {
         "mm" => 1e-3,
@@ -29,9 +31,13 @@ mod tests {
 
     #[test]
     fn lengths() {
-        for (text, expected) in
-            [("20.875mm", 0.020875), ("2.0875 cm", 0.020875), ("1in", 0.0254), ("0.5 m", 0.5), ("2e1mm", 0.02)]
-        {
+        for (text, expected) in [
+            ("20.875mm", 0.020875),
+            ("2.0875 cm", 0.020875),
+            ("1in", 0.0254),
+            ("0.5 m", 0.5),
+            ("2e1mm", 0.02),
+        ] {
             assert!((length_m(text).unwrap() - expected).abs() < 1e-15, "{text}");
         }
         for text in ["20.875", "", "mm", "nanmm", "infm", "20 furlongs", "1e999m"] {

@@ -28,7 +28,9 @@ pub use length::length_m;
 #[non_exhaustive]
 pub enum Error {
     /// A length that is no number with a unit.
-    #[error("`{0}` is not a length: give a number with its unit, like 20.875mm (units: mm, cm, m, in)")]
+    #[error(
+        "`{0}` is not a length: give a number with its unit, like 20.875mm (units: mm, cm, m, in)"
+    )]
     Length(String),
     /// A dictionary nobody knows.
     #[error("`{0}` is not a known dictionary; known are {known}", known = Dictionary::NAMES.join(", "))]

@@ -54,10 +54,26 @@ impl Homography {
         let mut ata = SMatrix::<f64, 9, 9>::zeros();
         for (p, q) in from_norm.iter().zip(&to_norm) {
             let r1 = SVector::<f64, 9>::from_column_slice(&[
-                p.x, p.y, 1.0, 0.0, 0.0, 0.0, -q.x * p.x, -q.x * p.y, -q.x,
+                p.x,
+                p.y,
+                1.0,
+                0.0,
+                0.0,
+                0.0,
+                -q.x * p.x,
+                -q.x * p.y,
+                -q.x,
             ]);
             let r2 = SVector::<f64, 9>::from_column_slice(&[
-                0.0, 0.0, 0.0, p.x, p.y, 1.0, -q.y * p.x, -q.y * p.y, -q.y,
+                0.0,
+                0.0,
+                0.0,
+                p.x,
+                p.y,
+                1.0,
+                -q.y * p.x,
+                -q.y * p.y,
+                -q.y,
             ]);
             ata += r1 * r1.transpose() + r2 * r2.transpose();
         }
@@ -71,7 +87,8 @@ impl Homography {
         let h = Matrix3::new(h[0], h[1], h[2], h[3], h[4], h[5], h[6], h[7], h[8]);
         let mut m = tt.try_inverse()? * h * tf;
         let n = from.len() as f64;
-        let centroid = from.iter().fold(Vector3::zeros(), |c, p| c + Vector3::new(p.x, p.y, 1.0)) / n;
+        let centroid =
+            from.iter().fold(Vector3::zeros(), |c, p| c + Vector3::new(p.x, p.y, 1.0)) / n;
         let w = (m * centroid).z;
         if w == 0.0 || !w.is_finite() {
             return None;
@@ -102,7 +119,8 @@ mod tests {
 
     #[test]
     fn recovers_a_known_map() {
-        let truth = Homography::new(Matrix3::new(1.2, 0.1, 30.0, -0.2, 0.9, 12.0, 1e-4, -2e-4, 1.0));
+        let truth =
+            Homography::new(Matrix3::new(1.2, 0.1, 30.0, -0.2, 0.9, 12.0, 1e-4, -2e-4, 1.0));
         let from: Vec<Pixel> =
             (0..20).map(|i| Pixel::new(f64::from(i % 5) * 40.0, f64::from(i / 5) * 50.0)).collect();
         let to: Vec<Pixel> = from.iter().map(|&p| truth.map(p).expect("in front")).collect();
@@ -116,7 +134,8 @@ mod tests {
 
     #[test]
     fn collinear_points_have_no_map() {
-        let line: Vec<Pixel> = (0..6).map(|i| Pixel::new(f64::from(i), 2.0 * f64::from(i))).collect();
+        let line: Vec<Pixel> =
+            (0..6).map(|i| Pixel::new(f64::from(i), 2.0 * f64::from(i))).collect();
         assert!(Homography::from_points(&line, &line).is_none());
         assert!(Homography::from_points(&line[..3], &line[..3]).is_none());
     }

@@ -59,7 +59,10 @@ impl<A, B> Mul<Point<B>> for Pose<A, B> {
 impl<A, B, C> Mul<Pose<B, C>> for Pose<A, B> {
     type Output = Pose<A, C>;
     fn mul(self, other: Pose<B, C>) -> Pose<A, C> {
-        Pose::new(self.rotation * other.rotation, self.rotation * other.translation + self.translation)
+        Pose::new(
+            self.rotation * other.rotation,
+            self.rotation * other.translation + self.translation,
+        )
     }
 }
 
@@ -86,8 +89,10 @@ mod tests {
 
     #[test]
     fn inverse_undoes() {
-        let color_from_board: Pose<Color, Board> =
-            Pose::new(Rotation::from_scaled_axis(Vector3::new(0.3, -0.8, 1.1)), Vector3::new(0.1, 0.2, 0.3));
+        let color_from_board: Pose<Color, Board> = Pose::new(
+            Rotation::from_scaled_axis(Vector3::new(0.3, -0.8, 1.1)),
+            Vector3::new(0.1, 0.2, 0.3),
+        );
         let p: Point<Board> = Point::new(0.5, -0.25, 0.125);
         let back = color_from_board.inverse() * (color_from_board * p);
         assert!((back.coords - p.coords).norm() < 1e-15);

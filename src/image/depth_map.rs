@@ -42,15 +42,19 @@ impl DepthMap {
     /// neighbours with a weight has no measurement: depth never blends across a hole.
     pub fn bilinear(&self, at: Pixel) -> Option<f64> {
         let (x, y) = (at.x, at.y);
-        if !(x >= 0.0 && y >= 0.0 && x <= self.width as f64 - 1.0 && y <= self.height as f64 - 1.0) {
+        if !(x >= 0.0 && y >= 0.0 && x <= self.width as f64 - 1.0 && y <= self.height as f64 - 1.0)
+        {
             return None;
         }
         let (x0, y0) = (x as usize, y as usize);
         let (fx, fy) = (x - x0 as f64, y - y0 as f64);
         let mut sum = 0.0;
-        for (dx, dy, weight) in
-            [(0, 0, (1.0 - fx) * (1.0 - fy)), (1, 0, fx * (1.0 - fy)), (0, 1, (1.0 - fx) * fy), (1, 1, fx * fy)]
-        {
+        for (dx, dy, weight) in [
+            (0, 0, (1.0 - fx) * (1.0 - fy)),
+            (1, 0, fx * (1.0 - fy)),
+            (0, 1, (1.0 - fx) * fy),
+            (1, 1, fx * fy),
+        ] {
             if weight > 0.0 {
                 sum += weight * f64::from(self.at(x0 + dx, y0 + dy));
             }

@@ -40,7 +40,8 @@ impl Gray {
     /// Bilinear interpolation; `None` outside the rectangle of pixel centres.
     pub fn bilinear(&self, at: Pixel) -> Option<f64> {
         let (x, y) = (at.x, at.y);
-        if !(x >= 0.0 && y >= 0.0 && x <= self.width as f64 - 1.0 && y <= self.height as f64 - 1.0) {
+        if !(x >= 0.0 && y >= 0.0 && x <= self.width as f64 - 1.0 && y <= self.height as f64 - 1.0)
+        {
             return None;
         }
         // On the last row or column the neighbour has weight zero; clamp its index.
