@@ -120,9 +120,9 @@ impl CharucoBoard {
 
     /// True where the square at (`column`, `row`) is white, that is, carries a marker.
     pub fn is_white(&self, layout: Layout, column: usize, row: usize) -> bool {
-        let even = (column + row) % 2 == 0;
+        let even = (column + row).is_multiple_of(2);
         match layout {
-            Layout::Legacy if self.squares_y % 2 == 0 => even,
+            Layout::Legacy if self.squares_y.is_multiple_of(2) => even,
             _ => !even,
         }
     }
