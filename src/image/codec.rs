@@ -1,9 +1,11 @@
 //! PNG bytes to images and back.
 
-use super::{DepthMap, Gray, Rgb};
+use std::io::{Cursor, ErrorKind};
+
+use super::{DepthMap, Gray, Rgb, rgb::luma};
 
 /// What an untrusted image may ask for.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Pixels at most; a header that asks for more is refused before anything is allocated.
     pub pixels: u64,
@@ -17,17 +19,17 @@ impl Default for Limits {
 }
 
 /// An image that cannot be read.
-#[derive(Debug, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// The bytes end early, fail a checksum or break the format.
-    #[error("damaged or truncated PNG: {0}")]
+    #[error("damaged or truncated PNG ({0}): copy the file again from where it came")]
     Damaged(String),
     /// A kind of image that is not used here.
     #[error("{0}")]
     Unsupported(String),
     /// More pixels than the limits allow.
-    #[error("{width}x{height} pixels are more than the limit of {limit}")]
+    #[error("{width}x{height} pixels are more than the limit of {limit} pixels")]
     Limits {
         /// Columns the header asks for.
         width: u64,
@@ -39,34 +41,425 @@ pub enum Error {
 }
 
 impl Gray {
-    /// Decodes an 8- or 16-bit PNG of any colour type to grey.
-    pub fn from_png(_bytes: &[u8], _limits: &Limits) -> Result<Self, Error> {
-        Err(Error::Unsupported("skeleton".into()))
+    /// Decodes a PNG of any colour type and bit depth to grey: colours by their luma as [`Rgb::to_gray`], 16 bits by
+    /// their higher byte, alpha dropped. Checksums are verified to the last byte.
+    pub fn from_png(bytes: &[u8], limits: &Limits) -> Result<Self, Error> {
+        let (width, height, pixels) = decode(bytes, limits, Samples::Eight, |color| {
+            Ok(match color {
+                png::ColorType::Grayscale => Box::new(|row, out| out.extend_from_slice(row)),
+                png::ColorType::GrayscaleAlpha => Box::new(|row: &[u8], out: &mut Vec<u8>| {
+                    out.extend(row.as_chunks::<2>().0.iter().map(|&[gray, _]| gray));
+                }),
+                png::ColorType::Rgba => Box::new(|row: &[u8], out: &mut Vec<u8>| {
+                    out.extend(row.as_chunks::<4>().0.iter().map(|&[r, g, b, _]| luma([r, g, b])));
+                }),
+                // The decoder has already looked up palettes.
+                png::ColorType::Rgb | png::ColorType::Indexed => {
+                    Box::new(|row: &[u8], out: &mut Vec<u8>| {
+                        out.extend(row.as_chunks::<3>().0.iter().map(|&rgb| luma(rgb)));
+                    })
+                }
+            })
+        })?;
+        Ok(Self::new(width, height, pixels))
     }
-    /// Encodes as PNG.
+
+    /// Encodes as PNG, fast rather than small. Panics for an image without pixels, which PNG cannot hold.
     pub fn to_png(&self) -> Vec<u8> {
-        Vec::new()
+        let size = (self.width(), self.height());
+        encode(size, png::ColorType::Grayscale, png::BitDepth::Eight, self.pixels())
     }
 }
 
 impl Rgb {
-    /// Decodes an 8- or 16-bit PNG of any colour type; alpha is dropped.
-    pub fn from_png(_bytes: &[u8], _limits: &Limits) -> Result<Self, Error> {
-        Err(Error::Unsupported("skeleton".into()))
+    /// Decodes a PNG of any colour type and bit depth: grey becomes three equal channels, 16 bits their higher byte,
+    /// alpha is dropped. Checksums are verified to the last byte.
+    pub fn from_png(bytes: &[u8], limits: &Limits) -> Result<Self, Error> {
+        let (width, height, pixels) = decode(bytes, limits, Samples::Eight, |color| {
+            Ok(match color {
+                png::ColorType::Grayscale => Box::new(|row: &[u8], out: &mut Vec<[u8; 3]>| {
+                    out.extend(row.iter().map(|&gray| [gray; 3]));
+                }),
+                png::ColorType::GrayscaleAlpha => Box::new(|row: &[u8], out: &mut Vec<[u8; 3]>| {
+                    out.extend(row.as_chunks::<2>().0.iter().map(|&[gray, _]| [gray; 3]));
+                }),
+                png::ColorType::Rgba => Box::new(|row: &[u8], out: &mut Vec<[u8; 3]>| {
+                    out.extend(row.as_chunks::<4>().0.iter().map(|&[r, g, b, _]| [r, g, b]));
+                }),
+                png::ColorType::Rgb | png::ColorType::Indexed => {
+                    Box::new(|row: &[u8], out: &mut Vec<[u8; 3]>| {
+                        out.extend_from_slice(row.as_chunks::<3>().0);
+                    })
+                }
+            })
+        })?;
+        Ok(Self::new(width, height, pixels))
     }
-    /// Encodes as PNG.
+
+    /// Encodes as PNG, fast rather than small. Panics for an image without pixels, which PNG cannot hold.
     pub fn to_png(&self) -> Vec<u8> {
-        Vec::new()
+        let size = (self.width(), self.height());
+        encode(size, png::ColorType::Rgb, png::BitDepth::Eight, self.pixels().as_flattened())
     }
 }
 
 impl DepthMap {
-    /// Decodes a 16-bit grey PNG whose values count `unit_m` metres; 0 becomes NaN.
-    pub fn from_png(_bytes: &[u8], _unit_m: f64, _limits: &Limits) -> Result<Self, Error> {
-        Err(Error::Unsupported("skeleton".into()))
+    /// Decodes a 16-bit grey PNG whose values count `unit_m` metres; 0 becomes NaN. Fewer bits or colours are
+    /// refused: such files hold a picture of depth, not depth.
+    pub fn from_png(bytes: &[u8], unit_m: f64, limits: &Limits) -> Result<Self, Error> {
+        let (width, height, depth_m) = decode(bytes, limits, Samples::AsStored, |color| {
+            if color != png::ColorType::Grayscale {
+                return Err(not_depth(&format!("{color:?}")));
+            }
+            Ok(Box::new(move |row: &[u8], out: &mut Vec<f32>| {
+                out.extend(row.as_chunks::<2>().0.iter().map(|&sample| {
+                    match u16::from_be_bytes(sample) {
+                        0 => f32::NAN,
+                        count => (f64::from(count) * unit_m) as f32,
+                    }
+                }));
+            }))
+        })?;
+        Ok(Self::new(width, height, depth_m))
     }
-    /// Encodes as a 16-bit grey PNG in units of `unit_m` metres, NaN as 0, rounded to nearest, capped at 65535.
-    pub fn to_png(&self, _unit_m: f64) -> Vec<u8> {
-        Vec::new()
+
+    /// Encodes as a 16-bit grey PNG in units of `unit_m` metres, NaN as 0, rounded to nearest, within 1 to 65535.
+    /// Fast rather than small. Panics for a map without pixels, which PNG cannot hold.
+    pub fn to_png(&self, unit_m: f64) -> Vec<u8> {
+        let counts: Vec<[u8; 2]> = self
+            .depth_m()
+            .iter()
+            .map(|&depth_m| {
+                let count = (f64::from(depth_m) / unit_m).round();
+                // A measurement must not turn into the sign for "none".
+                if count.is_nan() { 0 } else { count.clamp(1.0, 65535.0) as u16 }.to_be_bytes()
+            })
+            .collect();
+        let size = (self.width(), self.height());
+        encode(size, png::ColorType::Grayscale, png::BitDepth::Sixteen, counts.as_flattened())
+    }
+}
+
+/// What the rows handed to a [`Convert`] hold.
+#[derive(Clone, Copy, PartialEq)]
+enum Samples {
+    /// 8 bits: palettes looked up, fewer bits scaled to the full range, more bits cut.
+    Eight,
+    /// 16 bits as stored; other depths are refused.
+    AsStored,
+}
+
+/// Appends one decoded row to the pixels.
+type Convert<T> = Box<dyn Fn(&[u8], &mut Vec<T>)>;
+
+fn decode<T: Clone>(
+    bytes: &[u8],
+    limits: &Limits,
+    samples: Samples,
+    convert: impl FnOnce(png::ColorType) -> Result<Convert<T>, Error>,
+) -> Result<(usize, usize, Vec<T>), Error> {
+    let mut decoder = png::Decoder::new(Cursor::new(bytes));
+    // Texts and colour profiles are compressed by strangers and of no use here.
+    decoder.set_ignore_text_chunk(true);
+    decoder.set_ignore_iccp_chunk(true);
+    if samples == Samples::Eight {
+        decoder.set_transformations(png::Transformations::EXPAND | png::Transformations::STRIP_16);
+    }
+    let header = decoder.read_header_info().map_err(damaged)?;
+    let (width, height) = (u64::from(header.width), u64::from(header.height));
+    if width * height > limits.pixels {
+        return Err(Error::Limits { width, height, limit: limits.pixels });
+    }
+    let mut reader = decoder.read_info().map_err(damaged)?;
+    let (color, depth) = reader.output_color_type();
+    if samples == Samples::AsStored && depth != png::BitDepth::Sixteen {
+        return Err(not_depth(&format!("{}-bit", depth as u8)));
+    }
+    let append = convert(color)?;
+    let (width, height) = (width as usize, height as usize);
+    let n = width * height;
+    // Reserved, not touched: pages are only taken as rows arrive, so a lying header costs nothing.
+    let mut pixels = Vec::new();
+    let too_large = || Error::Unsupported(format!("no memory for {width}x{height} pixels"));
+    pixels.try_reserve_exact(n).map_err(|_| too_large())?;
+    if reader.info().interlaced {
+        let len = reader.output_buffer_size().ok_or_else(too_large)?;
+        let mut frame = Vec::new();
+        frame.try_reserve_exact(len).map_err(|_| too_large())?;
+        frame.resize(len, 0);
+        reader.next_frame(&mut frame).map_err(damaged)?;
+        append(&frame, &mut pixels);
+    } else {
+        let len = reader.output_line_size(width as u32).ok_or_else(too_large)?;
+        let mut row = vec![0; len];
+        while reader.read_row(&mut row).map_err(damaged)?.is_some() {
+            append(&row, &mut pixels);
+        }
+    }
+    reader.finish().map_err(damaged)?;
+    if pixels.len() != n {
+        return Err(Error::Damaged(format!("{} of {n} pixels", pixels.len())));
+    }
+    Ok((width, height, pixels))
+}
+
+fn not_depth(kind: &str) -> Error {
+    Error::Unsupported(format!(
+        "a depth image must be 16-bit grey, this one is {kind}: it is a picture of depth without a scale; \
+         export the measurements themselves"
+    ))
+}
+
+fn damaged(error: png::DecodingError) -> Error {
+    match error {
+        png::DecodingError::IoError(e) if e.kind() == ErrorKind::UnexpectedEof => {
+            Error::Damaged("the data end early".into())
+        }
+        png::DecodingError::LimitsExceeded => {
+            Error::Unsupported("a row or chunk of this PNG asks for more than 64 MiB".into())
+        }
+        other => Error::Damaged(other.to_string()),
+    }
+}
+
+fn encode(
+    (width, height): (usize, usize),
+    color: png::ColorType,
+    depth: png::BitDepth,
+    data: &[u8],
+) -> Vec<u8> {
+    let side = |n: usize| u32::try_from(n).expect("an image in memory has fewer than 2³² columns");
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, side(width), side(height));
+    encoder.set_color(color);
+    encoder.set_depth(depth);
+    encoder.set_compression(png::Compression::Fast);
+    encoder
+        .write_header()
+        .and_then(|mut writer| {
+            writer.write_image_data(data)?;
+            writer.finish()
+        })
+        .expect("memory takes all bytes, and the image has at least one pixel");
+    bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Stores 16-bit RGBA samples as any kind of PNG, for what our own encoder does not write.
+    fn png_of(
+        (width, height): (u32, u32),
+        color: png::ColorType,
+        depth: png::BitDepth,
+        data: &[u8],
+        more: impl FnOnce(&mut png::Encoder<'_, &mut Vec<u8>>),
+    ) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, width, height);
+        encoder.set_color(color);
+        encoder.set_depth(depth);
+        more(&mut encoder);
+        let mut writer = encoder.write_header().unwrap();
+        writer.write_image_data(data).unwrap();
+        writer.finish().unwrap();
+        bytes
+    }
+
+    fn noise(n: usize) -> Vec<u8> {
+        let mut state = 7u32;
+        (0..n)
+            .map(|_| {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                (state >> 24) as u8
+            })
+            .collect()
+    }
+
+    #[test]
+    fn round_trips() {
+        let gray = Gray::new(31, 17, noise(31 * 17));
+        assert_eq!(Gray::from_png(&gray.to_png(), &Limits::default()).unwrap(), gray);
+        let rgb = Rgb::new(31, 17, noise(31 * 17 * 3).as_chunks::<3>().0.to_vec());
+        assert_eq!(Rgb::from_png(&rgb.to_png(), &Limits::default()).unwrap(), rgb);
+        assert_eq!(Gray::from_png(&rgb.to_png(), &Limits::default()).unwrap(), rgb.to_gray());
+        let depth = DepthMap::new(3, 2, vec![f32::NAN, 0.2, 0.20006, 6.5535, 9.0, 1e-6]);
+        let back = DepthMap::from_png(&depth.to_png(1e-4), 1e-4, &Limits::default()).unwrap();
+        assert!(back.at(0, 0).is_nan());
+        // Rounded to the nearest count; beyond the last count it is capped, and never becomes 0.
+        for (i, expected) in [(1, 0.2), (2, 0.2001), (3, 6.5535), (4, 6.5535), (5, 1e-4)] {
+            assert!((back.depth_m()[i] - expected).abs() < 1e-7, "{i}: {}", back.depth_m()[i]);
+        }
+    }
+
+    #[test]
+    fn every_colour_type_and_bit_depth() {
+        use png::{BitDepth, ColorType};
+        let plain = |_: &mut png::Encoder<'_, &mut Vec<u8>>| ();
+        let gray =
+            |bytes: &[u8]| Gray::from_png(bytes, &Limits::default()).unwrap().pixels().to_vec();
+        let rgb =
+            |bytes: &[u8]| Rgb::from_png(bytes, &Limits::default()).unwrap().pixels().to_vec();
+
+        // Two pixels of each kind. 16 bits keep their higher byte.
+        let bytes =
+            png_of((2, 1), ColorType::Grayscale, BitDepth::Sixteen, &[10, 255, 20, 0], plain);
+        assert_eq!(gray(&bytes), [10, 20]);
+        assert_eq!(rgb(&bytes), [[10; 3], [20; 3]]);
+        let bytes =
+            png_of((2, 1), ColorType::GrayscaleAlpha, BitDepth::Eight, &[10, 0, 20, 255], plain);
+        assert_eq!(gray(&bytes), [10, 20]);
+        assert_eq!(rgb(&bytes), [[10; 3], [20; 3]]);
+        let colors = [[200, 100, 50], [1, 2, 3]];
+        let luma_of = colors.map(luma);
+        let bytes =
+            png_of((2, 1), ColorType::Rgba, BitDepth::Eight, &[200, 100, 50, 0, 1, 2, 3, 9], plain);
+        assert_eq!(gray(&bytes), luma_of);
+        assert_eq!(rgb(&bytes), colors);
+        let data = [200, 9, 100, 9, 50, 9, 1, 9, 2, 9, 3, 9];
+        let bytes = png_of((2, 1), ColorType::Rgb, BitDepth::Sixteen, &data, plain);
+        assert_eq!(gray(&bytes), luma_of);
+        assert_eq!(rgb(&bytes), colors);
+        // Bits count up to white: 1-bit 0/1, 2-bit 0..3.
+        let bytes = png_of((3, 1), ColorType::Grayscale, BitDepth::One, &[0b1010_0000], plain);
+        assert_eq!(gray(&bytes), [255, 0, 255]);
+        let bytes = png_of((4, 1), ColorType::Grayscale, BitDepth::Two, &[0b0001_1011], plain);
+        assert_eq!(gray(&bytes), [0, 85, 170, 255]);
+        // Palettes, with and without alpha.
+        let palette = |alpha: bool| {
+            png_of((2, 1), ColorType::Indexed, BitDepth::Four, &[0x10], |encoder| {
+                encoder.set_palette(vec![1, 2, 3, 200, 100, 50]);
+                if alpha {
+                    encoder.set_trns(vec![0, 255]);
+                }
+            })
+        };
+        for bytes in [palette(false), palette(true)] {
+            assert_eq!(rgb(&bytes), colors);
+            assert_eq!(gray(&bytes), luma_of);
+        }
+    }
+
+    /// PNG as Adam7 passes of 16-bit grey, value = 1000·row + column; unfiltered, in stored deflate blocks.
+    fn interlaced(width: usize, height: usize) -> Vec<u8> {
+        let passes = [
+            (0, 0, 8, 8),
+            (4, 0, 8, 8),
+            (0, 4, 4, 8),
+            (2, 0, 4, 4),
+            (0, 2, 2, 4),
+            (1, 0, 2, 2),
+            (0, 1, 1, 2),
+        ];
+        let mut data = Vec::new();
+        for (x0, y0, dx, dy) in passes {
+            for y in (y0..height).step_by(dy) {
+                let row: Vec<u8> = (x0..width)
+                    .step_by(dx)
+                    .flat_map(|x| ((1000 * y + x) as u16).to_be_bytes())
+                    .collect();
+                if !row.is_empty() {
+                    data.push(0);
+                    data.extend(row);
+                }
+            }
+        }
+        let (a, b) = data.iter().fold((1u32, 0u32), |(a, b), &byte| {
+            let a = (a + u32::from(byte)) % 65521;
+            (a, (b + a) % 65521)
+        });
+        let len = data.len() as u16;
+        let mut zlib = vec![0x78, 0x01, 1];
+        zlib.extend(len.to_le_bytes());
+        zlib.extend((!len).to_le_bytes());
+        zlib.extend(data);
+        zlib.extend((b << 16 | a).to_be_bytes());
+        let mut header = Vec::new();
+        header.extend((width as u32).to_be_bytes());
+        header.extend((height as u32).to_be_bytes());
+        header.extend([16, 0, 0, 0, 1]);
+        let mut bytes = b"\x89PNG\r\n\x1a\n".to_vec();
+        for (kind, body) in [(b"IHDR", header), (b"IDAT", zlib), (b"IEND", Vec::new())] {
+            bytes.extend((body.len() as u32).to_be_bytes());
+            let chunk: Vec<u8> = kind.iter().copied().chain(body).collect();
+            bytes.extend(&chunk);
+            bytes.extend(crc32(&chunk).to_be_bytes());
+        }
+        bytes
+    }
+
+    #[test]
+    fn interlaced_images_read() {
+        let bytes = interlaced(11, 9);
+        let depth = DepthMap::from_png(&bytes, 1.0, &Limits::default()).unwrap();
+        let gray = Gray::from_png(&bytes, &Limits::default()).unwrap();
+        for y in 0..9 {
+            for x in 0..11 {
+                let value = 1000 * y + x;
+                let expected = if value == 0 { f32::NAN } else { value as f32 };
+                assert_eq!(depth.at(x, y).to_bits(), expected.to_bits(), "({x}, {y})");
+                assert_eq!(usize::from(gray.row(y)[x]), value >> 8, "({x}, {y})");
+            }
+        }
+    }
+
+    #[test]
+    fn truncated_or_flipped_is_an_error_and_never_a_panic() {
+        let whole = Rgb::new(20, 9, noise(20 * 9 * 3).as_chunks::<3>().0.to_vec()).to_png();
+        for n in 0..whole.len() {
+            let error = Rgb::from_png(&whole[..n], &Limits::default()).unwrap_err();
+            assert!(matches!(error, Error::Damaged(_)), "{n} bytes: {error}");
+        }
+        // Every byte stands under some checksum or is checked itself.
+        for i in 0..whole.len() {
+            let mut bytes = whole.clone();
+            bytes[i] ^= 0x10;
+            assert!(Rgb::from_png(&bytes, &Limits::default()).is_err(), "byte {i}");
+            assert!(Gray::from_png(&bytes, &Limits::default()).is_err(), "byte {i}");
+        }
+    }
+
+    #[test]
+    fn limits_come_before_memory() {
+        // A header of 2³¹−1 columns and rows with nothing behind it.
+        let mut bytes = Gray::new(1, 1, vec![0]).to_png();
+        for side in [16..20, 20..24] {
+            bytes[side].copy_from_slice(&0x7fff_ffff_u32.to_be_bytes());
+        }
+        let crc = crc32(&bytes[12..29]);
+        bytes[29..33].copy_from_slice(&crc.to_be_bytes());
+        for limit in [200_000_000, 10] {
+            let error = Gray::from_png(&bytes, &Limits { pixels: limit }).unwrap_err();
+            assert!(matches!(error, Error::Limits { limit: l, .. } if l == limit), "{error}");
+        }
+        // Without any limit it must still not try.
+        assert!(Gray::from_png(&bytes, &Limits { pixels: u64::MAX }).is_err());
+        assert!(
+            Gray::from_png(&Gray::new(5, 2, vec![0; 10]).to_png(), &Limits { pixels: 10 }).is_ok()
+        );
+        assert!(
+            Gray::from_png(&Gray::new(11, 1, vec![0; 11]).to_png(), &Limits { pixels: 10 })
+                .is_err()
+        );
+    }
+
+    /// The checksum of PNG, bit by bit.
+    fn crc32(bytes: &[u8]) -> u32 {
+        !bytes.iter().fold(u32::MAX, |crc, &byte| {
+            (0..8).fold(crc ^ u32::from(byte), |c, _| {
+                if c & 1 == 1 { c >> 1 ^ 0xedb8_8320 } else { c >> 1 }
+            })
+        })
+    }
+
+    #[test]
+    fn pictures_of_depth_are_refused() {
+        let gray = Gray::new(2, 2, vec![1; 4]).to_png();
+        let rgb = Rgb::new(2, 2, vec![[1; 3]; 4]).to_png();
+        for bytes in [gray, rgb] {
+            let error = DepthMap::from_png(&bytes, 1e-4, &Limits::default()).unwrap_err();
+            assert!(error.to_string().contains("16-bit grey"), "{error}");
+        }
     }
 }
