@@ -54,6 +54,9 @@ pub mod depth;
 /// Findings: what is wrong, by how much, how sure.
 pub mod diagnose;
 
+/// The main job: a recording in, everything that can be known of it out.
+pub mod audit;
+
 // What leaves.
 
 /// Synthetic recordings with ground truth and chosen faults.

@@ -1,1 +1,24 @@
-//! (skeleton)
+//! Findings: what is wrong, by how much, how sure.
+//!
+//! [`diagnose`] takes a [`Case`] (what was read, seen, calibrated and compared) and gives one [`Finding`] per check.
+//! A finding has a [`Code`], a [`Verdict`] under the caller's [`Tolerances`], value and sigma with [`Unit`], the
+//! evidence in numbers and in a sentence, what to do, and the [`Correction`] it calls for.
+//!
+//! The rule behind every verdict, in [`Verdict::of`]: a *fault* is significant (beyond 3 σ) **and** relevant (beyond
+//! the tolerance); *ok* means that a fault of relevant size would have been seen; what is neither is *unknown*, and
+//! the finding says what to record to be able to tell.
+//!
+//! One file per finding; the text of `truedepth explain CODE` ([`Code::explanation`]) is that file's own
+//! documentation.
+//!
+//! Not here: pixels, pictures, and the corrections themselves: a finding names its correction, the shell applies it.
+
+mod case;
+mod code;
+mod device;
+mod finding;
+
+pub use case::{Case, diagnose};
+pub use code::{Code, UnknownCode};
+pub use device::{Device, DistortionState, Sensor};
+pub use finding::{Correction, Evidence, Finding, Tolerances, Unit, Verdict};

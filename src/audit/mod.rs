@@ -1,0 +1,16 @@
+//! The main job: a recording in, everything that can be known of it out.
+//!
+//! [`audit`] detects the board in every frame, calibrates, compares the sensor's depth with the board's under the
+//! factory's and under the own intrinsics, and judges. Its [`Audit`] holds all that the shells show. Images are
+//! decoded, looked at and dropped one by one, so that memory does not grow with the number of frames; with the
+//! feature `parallel` frames are looked at on all cores, with the same result bit by bit.
+//!
+//! A recording in which no board is seen is not an error: the findings then say "cannot tell", and what to record.
+//!
+//! Not here: reading arguments, printing, time; pictures and files ([`report`](crate::report)).
+
+mod job;
+mod options;
+
+pub use job::{Audit, Error, FrameAudit, audit, audit_observed};
+pub use options::{Method, Options, Progress, Stage};

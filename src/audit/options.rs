@@ -1,0 +1,65 @@
+//! What the shells choose, and what they are told on the way.
+
+use crate::{board::CharucoBoard, camera::Camera, diagnose::Tolerances};
+
+/// Where the own intrinsics come from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Method {
+    /// As the paper: one focal length, everything else as the factory says, views on a 4 cm grid, at least 9 corners.
+    Paper,
+    /// The camera model that predicts held-out corners best.
+    Auto,
+    /// A camera known from elsewhere; nothing is calibrated.
+    Given(Box<Camera>),
+}
+
+/// Choices of an audit.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Where the own intrinsics come from.
+    pub method: Method,
+    /// The board, where the recording does not tell or tells wrong; goes before the recording's own.
+    pub board: Option<CharucoBoard>,
+    /// What still counts as true.
+    pub tolerances: Tolerances,
+}
+
+impl Options {
+    /// This method, the recording's board, default tolerances.
+    pub fn new(method: Method) -> Self {
+        Self { method, board: None, tolerances: Tolerances::default() }
+    }
+}
+
+/// A part of the job.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Stage {
+    /// Images are decoded and corners detected; counted in frames.
+    Detect,
+    /// Intrinsics are estimated; one step.
+    Calibrate,
+    /// Depth is compared and findings are made; one step.
+    Judge,
+}
+
+impl Stage {
+    /// What is going on, for a progress bar: `detecting`, `calibrating`, `judging`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Detect => "detecting",
+            Self::Calibrate => "calibrating",
+            Self::Judge => "judging",
+        }
+    }
+}
+
+/// How far a stage has come. With several threads reports may arrive out of order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// Which part of the job.
+    pub stage: Stage,
+    /// Steps done.
+    pub done: usize,
+    /// Steps in all.
+    pub total: usize,
+}

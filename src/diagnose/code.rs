@@ -1,0 +1,106 @@
+//! The names of the checks.
+
+use std::{fmt, str::FromStr};
+
+/// name, title, file of the explanation.
+macro_rules! codes {
+    ($($code:ident, $file:literal, $title:literal;)*) => {
+        /// A check. Codes are stable: TD1xx the recording, TD2xx the camera, TD3xx depth, TD4xx alignment, TD5xx
+        /// metadata.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        #[non_exhaustive]
+        pub enum Code {
+            $(#[doc = $title] $code,)*
+        }
+
+        impl Code {
+            /// All of them, in order.
+            pub const ALL: &[Self] = &[$(Self::$code),*];
+
+            /// `TD201` and the like.
+            pub const fn name(self) -> &'static str {
+                match self { $(Self::$code => stringify!($code),)* }
+            }
+
+            /// A few words that name the check.
+            pub const fn title(self) -> &'static str {
+                match self { $(Self::$code => $title,)* }
+            }
+
+            /// What the check measures, why it matters, how, and what to do: the Markdown behind
+            /// `truedepth explain`.
+            pub const fn explanation(self) -> &'static str {
+                match self { $(Self::$code => include_str!(concat!($file, ".md")),)* }
+            }
+        }
+    };
+}
+
+codes! {
+    TD101, "td101_files", "Frames and metadata belong together";
+    TD201, "td201_focal_length", "Focal length";
+    TD203, "td203_not_rectified", "Stream rectified";
+    TD301, "td301_depth_scale", "Depth scale";
+    TD302, "td302_depth_bias", "Depth bias";
+    TD403, "td403_mirrored", "Images mirrored";
+    TD501, "td501_distortion_centre", "Principal point and distortion centre";
+    TD503, "td503_intrinsics_size", "Intrinsics at image size";
+    TD504, "td504_field_of_view", "Field of view";
+}
+
+impl fmt::Display for Code {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// A name that is no code.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{0}` is not the code of a finding; known are {known}", known = Code::ALL.iter().map(|c| c.name()).collect::<Vec<_>>().join(", "))]
+pub struct UnknownCode(pub String);
+
+impl FromStr for Code {
+    type Err = UnknownCode;
+
+    /// By name, in any case.
+    fn from_str(text: &str) -> Result<Self, UnknownCode> {
+        let text = text.trim();
+        Self::ALL
+            .iter()
+            .copied()
+            .find(|code| code.name().eq_ignore_ascii_case(text))
+            .ok_or_else(|| UnknownCode(text.to_owned()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_texts() {
+        assert_eq!("td201".parse(), Ok(Code::TD201));
+        assert!("TD999".parse::<Code>().is_err());
+        assert!(Code::ALL.windows(2).all(|pair| pair[0] < pair[1]), "in order");
+        for code in Code::ALL {
+            let headings: Vec<&str> =
+                code.explanation().lines().filter(|l| l.starts_with("## ")).collect();
+            let [a, b, c, d, e, f] = headings[..] else { panic!("{code}: {headings:?}") };
+            assert_eq!(
+                [a, b, c, d, f],
+                [
+                    "## What it measures",
+                    "## Why it matters",
+                    "## How",
+                    "## What to do",
+                    "## References"
+                ],
+                "{code}"
+            );
+            assert!(
+                e == "## Correction (safe)" || e == "## Correction (changes the data)",
+                "{code}: {e}"
+            );
+        }
+    }
+}

@@ -1,0 +1,214 @@
+//! What a finding says.
+
+use super::Code;
+use crate::{calibrate::Estimate, camera::TablePair};
+
+/// The judgement.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Verdict {
+    /// Significant and relevant: the data are wrong.
+    Fault,
+    /// Not wrong by a number, but it will hurt whoever does not know.
+    Warning,
+    /// Cannot tell from this recording.
+    Unknown,
+    /// Significant, but within the tolerance; or a fact worth knowing.
+    Info,
+    /// A fault of relevant size would have been seen.
+    Ok,
+}
+
+impl Verdict {
+    /// The verdict on a deviation (0 = true) with its sigma under a tolerance, all in one unit.
+    ///
+    /// ```text
+    /// |v| > 3σ and |v| > tolerance        fault
+    /// |v| + 3σ ≤ tolerance                info where |v| > 3σ, ok otherwise
+    /// anything else                       unknown
+    /// ```
+    ///
+    /// A significant deviation within the tolerance whose interval reaches beyond it is *unknown*, too: "ok" must
+    /// mean that a fault would have been seen. What is not a number is *unknown*.
+    pub fn of(deviation: Estimate, tolerance: f64) -> Self {
+        let (size, spread) = (deviation.value.abs(), 3.0 * deviation.sigma);
+        if size > spread && size > tolerance {
+            Self::Fault
+        } else if size + spread <= tolerance {
+            if size > spread { Self::Info } else { Self::Ok }
+        } else {
+            Self::Unknown
+        }
+    }
+
+    /// `fault`, `warning`, `unknown`, `info` or `ok`: stable, for machines.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Fault => "fault",
+            Self::Warning => "warning",
+            Self::Unknown => "unknown",
+            Self::Info => "info",
+            Self::Ok => "ok",
+        }
+    }
+}
+
+/// What the value of a finding counts. Findings speak to people: lengths are millimetres here.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Unit {
+    /// Percent.
+    Percent,
+    /// Pixels.
+    Px,
+    /// Millimetres.
+    Mm,
+    /// Degrees.
+    Degrees,
+    /// A number of things.
+    Count,
+}
+
+impl Unit {
+    /// `%`, `px`, `mm`, `deg` or nothing: stable, for machines and people.
+    pub const fn symbol(self) -> &'static str {
+        match self {
+            Self::Percent => "%",
+            Self::Px => "px",
+            Self::Mm => "mm",
+            Self::Degrees => "deg",
+            Self::Count => "",
+        }
+    }
+}
+
+/// A number that speaks for the verdict.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Evidence {
+    /// Stable name in the style of `factory_focal_px`; carries the unit.
+    pub name: &'static str,
+    /// The number.
+    pub value: f64,
+    /// Its standard deviation, where it is an estimate.
+    pub sigma: Option<f64>,
+}
+
+/// What a recording would have to be put through to be true. Parameters are those of this recording.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Correction {
+    /// Replace the focal length: metadata only, safe.
+    Focal {
+        /// The true focal length at the image's size, pixels.
+        focal_px: f64,
+    },
+    /// Resample colour (and depth, never blending) to straight lines with Apple's forward table: changes the data.
+    Undistort {
+        /// The tables, where the recording has them; without, the own camera model has to be used.
+        tables: Option<Box<TablePair>>,
+    },
+    /// Divide depth by a factor after taking away a bias: changes the data.
+    Depth {
+        /// Sensor = scale · truth + bias.
+        scale: f64,
+        /// Bias, metres.
+        bias_m: f64,
+    },
+    /// Mirror the images back: changes the data.
+    Unmirror,
+    /// Divide the intrinsics by reference size over image size: metadata only, safe.
+    ScaleIntrinsics {
+        /// Factor for fx and cx, and for fy and cy.
+        factor: [f64; 2],
+    },
+}
+
+impl Correction {
+    /// `focal`, `undistort`, `depth`, `unmirror` or `scale_intrinsics`: stable, for machines.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Focal { .. } => "focal",
+            Self::Undistort { .. } => "undistort",
+            Self::Depth { .. } => "depth",
+            Self::Unmirror => "unmirror",
+            Self::ScaleIntrinsics { .. } => "scale_intrinsics",
+        }
+    }
+
+    /// True where images or depth maps change, false where only metadata do.
+    pub const fn changes_data(&self) -> bool {
+        !matches!(self, Self::Focal { .. } | Self::ScaleIntrinsics { .. })
+    }
+}
+
+/// One thing that was checked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Finding {
+    /// Which check.
+    pub code: Code,
+    /// The judgement.
+    pub verdict: Verdict,
+    /// What was measured: the deviation from what ought to be, in `unit`. `None` where nothing could be measured.
+    pub value: Option<f64>,
+    /// Standard deviation of `value`. `None` where the value is no estimate (metadata, counts).
+    pub sigma: Option<f64>,
+    /// Unit of value, sigma and tolerance.
+    pub unit: Unit,
+    /// Beyond this a significant deviation is a fault; `None` where the check knows no tolerance.
+    pub tolerance: Option<f64>,
+    /// What was found, in one sentence with the numbers and the test that was applied.
+    pub summary: String,
+    /// The numbers behind it.
+    pub evidence: Vec<Evidence>,
+    /// What the person should do now; with *unknown*, what to record to be able to tell. Empty where nothing is.
+    pub what_to_do: String,
+    /// What would make the data true, where something would.
+    pub correction: Option<Correction>,
+}
+
+impl Finding {
+    /// A few words that name the check, e.g. `Focal length`.
+    pub fn title(&self) -> &'static str {
+        self.code.title()
+    }
+}
+
+/// What still counts as true.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tolerances {
+    /// Focal length against the factory's, fraction (0.01 = 1 %).
+    pub focal: f64,
+    /// Depth scale, fraction.
+    pub depth_scale: f64,
+    /// Depth bias, metres.
+    pub depth_bias_m: f64,
+    /// Residual lens distortion at the corner of the image, pixels.
+    pub distortion_px: f64,
+}
+
+impl Default for Tolerances {
+    /// 1 % for focal length and depth scale (at 0.3 m, 3 mm: the sensor's own noise), 3 mm for the bias for the same
+    /// reason, 1 px for distortion (a straight line is then still straight to the eye).
+    fn default() -> Self {
+        Self { focal: 0.01, depth_scale: 0.01, depth_bias_m: 0.003, distortion_px: 1.0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rule() {
+        for (value, sigma, expected) in [
+            (-0.06, 0.002, Verdict::Fault),
+            (0.06, 0.03, Verdict::Unknown),  // relevant, but uncertain
+            (0.004, 0.001, Verdict::Info),   // significant, but small, and surely small
+            (0.001, 0.001, Verdict::Ok),     // a fault would have been seen
+            (0.001, 0.02, Verdict::Unknown), // a fault could hide
+            (0.009, 0.001, Verdict::Unknown),
+            (f64::NAN, 0.001, Verdict::Unknown),
+            (0.0, f64::INFINITY, Verdict::Unknown),
+        ] {
+            assert_eq!(Verdict::of(Estimate { value, sigma }, 0.01), expected, "{value} ± {sigma}");
+        }
+    }
+}
