@@ -1,6 +1,6 @@
 //! The job itself.
 
-use super::{Options, Progress};
+use super::{Method, Options, Progress};
 use crate::{
     board::{CharucoBoard, Layout},
     calibrate::Calibration,
@@ -16,6 +16,8 @@ use crate::{
 pub struct Audit {
     /// Name of the recording, for people.
     pub name: String,
+    /// Where the own intrinsics come from, as it was asked for.
+    pub method: Method,
     /// Which camera made it.
     pub device: Device,
     /// The board that was looked for, with its layout where it was seen.

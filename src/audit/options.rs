@@ -13,6 +13,17 @@ pub enum Method {
     Given(Box<Camera>),
 }
 
+impl Method {
+    /// `paper`, `auto` or `given`: stable, for machines.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Paper => "paper",
+            Self::Auto => "auto",
+            Self::Given(_) => "given",
+        }
+    }
+}
+
 /// Choices of an audit.
 #[derive(Clone, Debug)]
 pub struct Options {
