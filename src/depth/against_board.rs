@@ -125,3 +125,153 @@ fn mean(values: &[f64]) -> Option<Estimate> {
     let sigma = if values.len() > 1 { (variance / n).sqrt() } else { f64::INFINITY };
     Some(Estimate { value, sigma })
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::LazyLock;
+
+    use super::*;
+    use crate::{
+        detect::Corner,
+        geom::{Pose, Rotation, Vector3},
+    };
+
+    /// A reproducible normal deviate: the sum of twelve uniform ones (a linear congruential generator), minus six.
+    struct Noise(u64);
+    impl Noise {
+        fn uniform(&mut self) -> f64 {
+            self.0 = self
+                .0
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (self.0 >> 11) as f64 / (1u64 << 53) as f64
+        }
+        fn normal(&mut self) -> f64 {
+            (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+        }
+    }
+
+    fn board() -> &'static CharucoBoard {
+        static BOARD: LazyLock<CharucoBoard> =
+            LazyLock::new(|| CharucoBoard::paper(0.020875).unwrap());
+        &BOARD
+    }
+
+    fn view(frame: usize, distance_m: f64, tilt_rad: f64) -> View {
+        let corners = (0..board().n_corners())
+            .map(|id| Corner { id, pixel: Pixel::new(id as f64, 1.0), sigma_px: 0.1 })
+            .collect::<Vec<_>>();
+        let rotation = Rotation::from_scaled_axis(Vector3::new(0.0, tilt_rad, 0.0));
+        View {
+            frame,
+            residuals_px: vec![[0.0; 2]; corners.len()],
+            corners,
+            color_from_board: Pose::new(rotation, Vector3::new(-0.1, -0.08, distance_m)),
+            rms_px: 0.0,
+        }
+    }
+
+    fn board_z(view: &View, id: usize) -> f64 {
+        (view.color_from_board * board().corner(id)).z()
+    }
+
+    #[test]
+    fn sign_holes_and_drops() {
+        let view = view(3, 0.2, 0.0);
+        let mut sensed: Vec<Option<f64>> = vec![Some(0.199); view.corners.len()];
+        sensed[0] = None;
+        sensed[1] = Some(0.221); // 21 mm beyond the board: dropped
+        sensed[2] = Some(0.1801); // 19.9 mm before it: kept
+        let depth = against_board(board(), &[(&view, &sensed)]);
+        let frame = &depth.frames[0];
+        assert_eq!((frame.frame, frame.n_holes, frame.n_beyond), (3, 1, 1));
+        assert_eq!(frame.samples.len(), 62);
+        assert_eq!(frame.kept().count(), 61);
+        // The sensor measures 1 mm too near: board − sensor is +1 mm.
+        assert!((frame.median_error_m.unwrap() - 0.001).abs() < 1e-12);
+        assert!(depth.mean_of_medians_m.unwrap().sigma.is_infinite());
+        assert!(depth.line.is_none());
+    }
+
+    #[test]
+    fn depth_is_read_where_the_corner_was_seen() {
+        // Depth grows by 1 mm per column; a hole at (5, 2).
+        let mut depth_m: Vec<f32> = (0..10 * 4).map(|i| 0.2 + 0.001 * (i % 10) as f32).collect();
+        depth_m[2 * 10 + 5] = f32::NAN;
+        let map = DepthMap::new(10, 4, depth_m);
+        let corner = |x, y| Corner { id: 0, pixel: Pixel::new(x, y), sigma_px: 0.1 };
+        let sensed = sense(&map, &[corner(2.5, 1.0), corner(4.5, 1.5), corner(9.5, 1.0)]);
+        assert!((sensed[0].unwrap() - 0.2025).abs() < 1e-7);
+        assert_eq!(sensed[1..], [None, None]);
+    }
+
+    /// Sensors with known scale and bias, pose errors shared by each view, a wavy board, noise and outliers.
+    fn line(scale: f64, bias_m: f64, seed: u64) -> DepthLine {
+        let mut noise = Noise(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+        let views: Vec<View> = (0..25)
+            .map(|i| view(i, 0.18 + 0.008 * i as f64, 0.4 * (noise.uniform() - 0.5)))
+            .collect();
+        let wave: Vec<f64> = (0..board().n_corners())
+            .map(|id| {
+                let (column, row) = board().corner_cell(id);
+                0.0008 * (0.8 * column as f64).sin() * (0.7 * row as f64).cos()
+            })
+            .collect();
+        let sensed: Vec<Vec<Option<f64>>> = views
+            .iter()
+            .map(|view| {
+                let pose_error = 0.001 * noise.normal();
+                (0..view.corners.len())
+                    .map(|id| {
+                        let truth = board_z(view, id) + wave[id] + pose_error;
+                        let outlier = if noise.uniform() < 0.05 { 0.05 } else { 0.0 };
+                        Some(scale * truth + bias_m + 0.0005 * noise.normal() + outlier)
+                    })
+                    .collect()
+            })
+            .collect();
+        let pairs: Vec<_> = views.iter().zip(&sensed).map(|(v, s)| (v, s.as_slice())).collect();
+        against_board(board(), &pairs).line.unwrap()
+    }
+
+    #[test]
+    fn scale_and_bias_with_honest_sigmas() {
+        for (scale, bias_m) in [(1.0, 0.0), (1.06, 0.0), (0.97, 0.004), (1.0, -0.01)] {
+            let mut squares = [0.0; 3];
+            let n = 200;
+            for seed in 0..n {
+                let line = line(scale, bias_m, seed + 1);
+                let truth_at_center = (scale - 1.0) * line.center_m + bias_m;
+                squares[0] += ((line.scale.value - scale) / line.scale.sigma).powi(2);
+                squares[1] += ((line.bias_m.value - bias_m) / line.bias_m.sigma).powi(2);
+                squares[2] +=
+                    ((line.offset_m.value - truth_at_center) / line.offset_m.sigma).powi(2);
+                assert!(line.scale.sigma < 0.01 && line.correlation < -0.9, "{line:?}");
+            }
+            // Mean square of the normalised errors: 1 where the sigmas are right. 200 draws leave ±0.1; sigmas are the
+            // largest of four, so somewhat below 1.
+            for square in squares.map(|s| s / n as f64) {
+                assert!((0.3..1.5).contains(&square), "{scale} {bias_m}: {squares:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn one_distance_does_not_tell_scale_from_bias() {
+        let views: Vec<View> = (0..5).map(|i| view(i, 0.2 + 0.0002 * i as f64, 0.0)).collect();
+        let mut noise = Noise(7);
+        let sensed: Vec<Vec<Option<f64>>> = views
+            .iter()
+            .map(|v| {
+                (0..63).map(|id| Some(0.98 * board_z(v, id) + 0.0005 * noise.normal())).collect()
+            })
+            .collect();
+        let pairs: Vec<_> = views.iter().zip(&sensed).map(|(v, s)| (v, s.as_slice())).collect();
+        let line = against_board(board(), &pairs).line.unwrap();
+        assert!(line.scale.sigma > 0.05, "{line:?}");
+        assert!(
+            (line.offset_m.value + 0.004).abs() < 3.0 * line.offset_m.sigma.max(1e-4),
+            "{line:?}"
+        );
+    }
+}

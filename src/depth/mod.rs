@@ -9,9 +9,31 @@
 //! axis. Apple's depth maps are aligned with the colour image as it is, distorted or not, so the map is read at the
 //! corner as observed, never at its rectified place.
 //!
+//! ```
+//! use truedepth::{
+//!     board::CharucoBoard, depth::{against_board, sense}, detect::Corner, geom::{Pixel, Pose, Rotation, Vector3},
+//!     image::DepthMap, pose::View,
+//! };
+//!
+//! let board = CharucoBoard::paper(0.020875)?;
+//! let view = View {
+//!     frame: 0,
+//!     corners: vec![Corner { id: 0, pixel: Pixel::new(3.5, 2.0), sigma_px: 0.1 }],
+//!     color_from_board: Pose::new(Rotation::identity(), Vector3::new(0.0, 0.0, 0.200)),
+//!     residuals_px: vec![[0.0; 2]],
+//!     rms_px: 0.0,
+//! };
+//! let map = DepthMap::new(8, 6, vec![0.198; 48]);
+//! let depth = against_board(&board, &[(&view, &sense(&map, &view.corners))]);
+//! let error_m = depth.frames[0].median_error_m.expect("one corner");
+//! assert!((error_m - 0.002).abs() < 1e-7); // the sensor measures 2 mm too near
+//! # Ok::<(), truedepth::board::Error>(())
+//! ```
+//!
 //! Not here: verdicts ([`diagnose`](crate::diagnose)), images other than depth maps.
 
 mod against_board;
+mod clustered;
 mod line;
 
 pub use against_board::{BoardDepth, FrameDepth, MAX_ERROR_M, Sample, against_board, sense};
