@@ -1,10 +1,39 @@
-//! ChArUco corners of an image, each with its own uncertainty. (skeleton: types only)
+//! ChArUco corners of an image, each with its own uncertainty.
+//!
+//! A person sees the chessboard first and the markers in it second; so does the [`Detector`]:
+//!
+//! 1. `saddle`: crossings of two edges in a smoothed image;
+//! 2. `lattice`: who is whose neighbour, along the edges;
+//! 3. `identify`: which part of the board it is, by the joint vote of all visible markers, accepted only with a clear
+//!    lead over the runner-up;
+//! 4. `refine`: every corner the board should show, to sub-pixel, with its standard deviation.
+//!
+//! An [`Observation`] holds what was found *and* what was not taken, with the reason. The detector may miss a corner;
+//! it does not invent one: later steps drop, they never relabel.
+//!
+//! ```
+//! use truedepth::{board::CharucoBoard, detect::Detector, image::Gray};
+//!
+//! let board: CharucoBoard = "10x8:20.875mm:10.4375mm:ARUCO_ORIGINAL".parse()?;
+//! let detector = Detector::new(&board);
+//! let nothing = detector.detect(&Gray::new(640, 480, vec![0; 640 * 480]));
+//! assert!(nothing.corners.is_empty() && nothing.identity.is_none());
+//! # Ok::<(), truedepth::board::Error>(())
+//! ```
+//!
+//! Not here: camera models and poses. Nothing below knows a focal length.
 
-use crate::{
-    board::{CharucoBoard, Layout},
-    geom::Pixel,
-    image::Gray,
-};
+mod detector;
+mod identify;
+mod lattice;
+mod map;
+mod pyramid;
+mod refine;
+mod saddle;
+
+pub use detector::Detector;
+
+use crate::{board::Layout, geom::Pixel};
 
 /// What was seen of a board in one image.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,7 +49,7 @@ pub struct Observation {
 /// One inner corner of the board.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Corner {
-    /// Id as [`CharucoBoard::corner`] counts.
+    /// Id as [`CharucoBoard::corner`](crate::board::CharucoBoard::corner) counts.
     pub id: usize,
     /// Where it lies.
     pub pixel: Pixel,
@@ -53,28 +82,36 @@ pub struct Reject {
 }
 
 /// Why a candidate was not taken.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[non_exhaustive]
 pub enum Reason {
-    /// skeleton
+    /// A lattice without anything like a marker in its squares.
+    NoMarkers,
+    /// A lattice whose markers do not agree on one place of the board.
+    Ambiguous,
+    /// A lattice beside the one that was identified: another board, or a part cut off from it.
+    SecondLattice,
+    /// A node of the lattice where the board has no corner.
+    OffBoard,
+    /// The board has a corner here, the image shows no crossing of two edges.
+    NoCrossing,
+    /// A crossing too far from where its neighbours say the corner is.
     OffLattice,
+    /// A crossing too uncertain to be of use.
+    Uncertain,
 }
 
-/// Finds a board in images.
-#[derive(Clone, Debug)]
-pub struct Detector {
-    board: CharucoBoard,
-}
-
-impl Detector {
-    /// A detector for this board; where the board's layout is not given it is found from the image.
-    pub fn new(board: &CharucoBoard) -> Self {
-        Self { board: board.clone() }
-    }
-
-    /// The board's corners in `image`. May miss, does not invent.
-    pub fn detect(&self, _image: &Gray) -> Observation {
-        let _ = &self.board;
-        Observation { corners: Vec::new(), identity: None, rejects: Vec::new() }
+impl Reason {
+    /// One word or two, as the JSON writes it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::NoMarkers => "no_markers",
+            Self::Ambiguous => "ambiguous",
+            Self::SecondLattice => "second_lattice",
+            Self::OffBoard => "off_board",
+            Self::NoCrossing => "no_crossing",
+            Self::OffLattice => "off_lattice",
+            Self::Uncertain => "uncertain",
+        }
     }
 }

@@ -1,0 +1,273 @@
+//! The whole way from an image to an observation.
+
+use crate::{board::CharucoBoard, geom::Pixel, image::Gray};
+
+use super::{
+    Corner, Identity, Observation, Reason, Reject,
+    identify::{NotIdentified, Placement, identify},
+    lattice::{Lattice, lattices},
+    map::SmoothMap,
+    pyramid::Level,
+    refine::{Guess, noise_sigma, refine},
+    saddle::{Saddle, saddles},
+};
+
+/// Finds a board in images.
+///
+/// A detector holds no state between images and can be shared between threads.
+#[derive(Clone, Debug)]
+pub struct Detector {
+    board: CharucoBoard,
+}
+
+/// Saddles kept at most, for every million pixels of a level and at least: boards have at most a few hundred corners,
+/// the rest is texture.
+const MOST_SADDLES_PER_MPX: f64 = 12_000.0;
+const LEAST_MOST_SADDLES: usize = 600;
+/// Nodes that make a lattice worth reading: two cells.
+const MIN_NODES: usize = 6;
+/// Lattices tried on one level, largest first.
+const MOST_LATTICES: usize = 4;
+/// Half of the image's diagonal in pixels of the coarsest level tried.
+const COARSEST: usize = 120;
+/// A corner whose σ exceeds this is of no use, pixels.
+const MAX_SIGMA_PX: f64 = 0.7;
+
+impl Detector {
+    /// A detector for this board. Its layout is found from the image; the one the board states only breaks ties.
+    pub fn new(board: &CharucoBoard) -> Self {
+        Self { board: board.clone() }
+    }
+
+    /// The board that is sought.
+    pub fn board(&self) -> &CharucoBoard {
+        &self.board
+    }
+
+    /// The board's corners in `image`. May miss, does not invent.
+    pub fn detect(&self, image: &Gray) -> Observation {
+        let mut rejects = Vec::new();
+        let mut best: Option<Found> = None;
+        for factor in factors(image) {
+            let Some(level) = Level::new(image, factor) else { continue };
+            let found = self.search(image, &level, &mut rejects);
+            if let Some(found) = found
+                && best.as_ref().is_none_or(|b| found.lattice.nodes.len() > b.lattice.nodes.len())
+            {
+                best = Some(found);
+            }
+            if best.is_some() {
+                break;
+            }
+        }
+        match best {
+            Some(found) => self.collect(image, &found, rejects),
+            None => Observation { corners: Vec::new(), identity: None, rejects },
+        }
+    }
+
+    /// Identifies the best lattice of one level.
+    fn search(&self, image: &Gray, level: &Level, rejects: &mut Vec<Reject>) -> Option<Found> {
+        let mpx = (level.width * level.height) as f64 * 1e-6;
+        let most = ((MOST_SADDLES_PER_MPX * mpx) as usize).max(LEAST_MOST_SADDLES);
+        let saddles = saddles(level, most);
+        let mut identified: Option<Found> = None;
+        for lattice in lattices(level, &saddles, MIN_NODES).into_iter().take(MOST_LATTICES) {
+            let place = |s: &Saddle| level.to_image(s.x, s.y);
+            let middle =
+                |lattice: &Lattice| place(&saddles[lattice.nodes[lattice.nodes.len() / 2].saddle]);
+            if identified.is_some() {
+                rejects.push(Reject { pixel: middle(&lattice), reason: Reason::SecondLattice });
+                continue;
+            }
+            let nodes: Vec<([f64; 2], Pixel)> = lattice
+                .nodes
+                .iter()
+                .map(|n| ([f64::from(n.i), f64::from(n.j)], place(&saddles[n.saddle])))
+                .collect();
+            let Some(map) = SmoothMap::fit(&nodes) else { continue };
+            let mut contrasts: Vec<f32> =
+                lattice.nodes.iter().map(|n| saddles[n.saddle].contrast).collect();
+            contrasts.sort_unstable_by(f32::total_cmp);
+            let contrast = f64::from(contrasts[contrasts.len() / 2]);
+            match identify(&self.board, image, &lattice, &map, contrast) {
+                Ok(placement) => identified = Some(Found { lattice, placement, nodes }),
+                Err(why) => {
+                    let reason = match why {
+                        NotIdentified::NoMarkers => Reason::NoMarkers,
+                        NotIdentified::Ambiguous => Reason::Ambiguous,
+                    };
+                    rejects.push(Reject { pixel: middle(&lattice), reason });
+                }
+            }
+        }
+        identified
+    }
+
+    /// Refines every corner that the identified board shows.
+    fn collect(&self, image: &Gray, found: &Found, mut rejects: Vec<Reject>) -> Observation {
+        let board = &self.board;
+        let (columns, rows) = (board.squares_x as i32 - 1, board.squares_y as i32 - 1);
+        let placement = &found.placement;
+        let mut known: Vec<([f64; 2], Pixel)> = Vec::new();
+        for (node, (_, pixel)) in found.lattice.nodes.iter().zip(&found.nodes) {
+            let [x, y] = placement.corner(node.i, node.j);
+            if (0..columns).contains(&x) && (0..rows).contains(&y) {
+                known.push(([f64::from(x), f64::from(y)], *pixel));
+            } else {
+                rejects.push(Reject { pixel: *pixel, reason: Reason::OffBoard });
+            }
+        }
+        let noise = noise_sigma(image);
+        let rim = (1.0 - board.marker_m / board.square_m) / 2.0;
+        // First with what the lattice knew, then with what that found: corners far from the lattice come into reach.
+        let mut corners: Vec<Corner> = Vec::new();
+        for pass in 0..3 {
+            let Some(map) = SmoothMap::fit(&known) else { break };
+            let n_before = corners.len();
+            corners.clear();
+            let mut failed = Vec::new();
+            for id in 0..board.n_corners() {
+                let (x, y) = board.corner_cell(id);
+                let (x, y) = (x as f64, y as f64);
+                let (Some(predicted), Some(axes)) = (map.at(x, y), map.axes(x, y)) else {
+                    continue;
+                };
+                if !inside(image, predicted) {
+                    continue;
+                }
+                match self.corner(image, predicted, axes, rim, noise) {
+                    Ok((pixel, sigma_px)) => corners.push(Corner { id, pixel, sigma_px }),
+                    Err(reason) => failed.push(Reject { pixel: predicted, reason }),
+                }
+            }
+            known = corners
+                .iter()
+                .map(|c| {
+                    let (x, y) = board.corner_cell(c.id);
+                    ([x as f64, y as f64], c.pixel)
+                })
+                .collect();
+            if pass > 0 && corners.len() <= n_before || pass == 2 {
+                rejects.extend(failed);
+                break;
+            }
+        }
+        self.drop_strays(&mut corners, &mut rejects);
+        let identity = Identity {
+            layout: placement.layout,
+            mirrored: placement.mirrored,
+            inverted: placement.inverted,
+            n_markers: placement.n_markers,
+            margin: placement.margin,
+        };
+        if corners.len() < 4 {
+            return Observation { corners: Vec::new(), identity: None, rejects };
+        }
+        Observation { corners, identity: Some(identity), rejects }
+    }
+
+    /// One corner near its prediction.
+    fn corner(
+        &self,
+        image: &Gray,
+        predicted: Pixel,
+        axes: [[f64; 2]; 2],
+        rim: f64,
+        noise: f64,
+    ) -> Result<(Pixel, f64), Reason> {
+        let spacing = axes[0][0].hypot(axes[0][1]).min(axes[1][0].hypot(axes[1][1]));
+        let reach = (0.2 * spacing).clamp(1.5, 6.0);
+        let guess = Guess { pixel: predicted, axes, rim, noise };
+        let refined = refine(image, &guess, reach).ok_or(Reason::NoCrossing)?;
+        if refined.sigma_px > MAX_SIGMA_PX {
+            return Err(Reason::Uncertain);
+        }
+        if !is_crossing(image, refined.pixel, axes, rim) {
+            return Err(Reason::NoCrossing);
+        }
+        Ok((refined.pixel, refined.sigma_px))
+    }
+
+    /// Drops corners that the map through all others does not expect there.
+    fn drop_strays(&self, corners: &mut Vec<Corner>, rejects: &mut Vec<Reject>) {
+        loop {
+            let known: Vec<([f64; 2], Pixel)> = corners
+                .iter()
+                .map(|c| {
+                    let (x, y) = self.board.corner_cell(c.id);
+                    ([x as f64, y as f64], c.pixel)
+                })
+                .collect();
+            let Some(map) = SmoothMap::fit(&known) else { return };
+            let distances: Vec<f64> = known
+                .iter()
+                .map(|(p, q)| map.at(p[0], p[1]).map_or(f64::INFINITY, |e| e.distance(*q)))
+                .collect();
+            let mut sorted = distances.clone();
+            sorted.sort_unstable_by(f64::total_cmp);
+            let limit = (6.0 * sorted[sorted.len() / 2]).max(0.6);
+            let Some((worst, &distance)) =
+                distances.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))
+            else {
+                return;
+            };
+            if distance <= limit {
+                return;
+            }
+            rejects.push(Reject { pixel: corners[worst].pixel, reason: Reason::OffLattice });
+            corners.remove(worst);
+        }
+    }
+}
+
+/// An identified lattice.
+struct Found {
+    lattice: Lattice,
+    placement: Placement,
+    /// Where its nodes lie.
+    nodes: Vec<([f64; 2], Pixel)>,
+}
+
+/// Blocks to try, best guess first: squares of 12 to 150 pixels are seen at half resolution, smaller ones at full,
+/// larger ones on a coarser level.
+fn factors(image: &Gray) -> Vec<usize> {
+    let size = image.width().min(image.height());
+    let mut factors = vec![2, 1];
+    let mut factor = 4;
+    while size / factor >= COARSEST {
+        factors.push(factor);
+        factor *= 2;
+    }
+    factors
+}
+
+/// True where a corner can be measured: three pixels from the border at least.
+fn inside(image: &Gray, p: Pixel) -> bool {
+    const BORDER: f64 = 2.0;
+    p.x >= BORDER
+        && p.y >= BORDER
+        && p.x <= image.width() as f64 - 1.0 - BORDER
+        && p.y <= image.height() as f64 - 1.0 - BORDER
+}
+
+/// True where the four squares round a corner alternate in colour.
+fn is_crossing(image: &Gray, at: Pixel, [u, v]: [[f64; 2]; 2], rim: f64) -> bool {
+    let spacing = u[0].hypot(u[1]).min(v[0].hypot(v[1]));
+    let d = (0.75 * rim).max(1.5 / spacing).min(0.3);
+    let sample = |a: f64, b: f64| {
+        image.bilinear(Pixel::new(
+            at.x + d * (a * u[0] + b * v[0]),
+            at.y + d * (a * u[1] + b * v[1]),
+        ))
+    };
+    let quadrants = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)].map(|(a, b)| sample(a, b));
+    let [Some(a), Some(b), Some(c), Some(e)] = quadrants else {
+        // At the rim of the image a quadrant may be outside; the gradients have already agreed on a crossing.
+        return true;
+    };
+    let (high, low) = (a.min(c), b.max(e));
+    let (other_high, other_low) = (b.min(e), a.max(c));
+    let range = a.max(b).max(c).max(e) - a.min(b).min(c).min(e);
+    (high - low).max(other_high - other_low) > 0.25 * range && range > 6.0
+}

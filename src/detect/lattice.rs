@@ -1,0 +1,234 @@
+//! Saddles joined to lattices: which corner is whose neighbour.
+//!
+//! A chessboard's corners are linked along its edges. For each of the four edges of a saddle the nearest saddle in
+//! that direction is its neighbour if the colours of the squares between them agree at both ends *and* along the
+//! way. Links that both ends agree on are followed from saddle to saddle, which numbers them (i, j) without any model
+//! of the camera: perspective and lens distortion only bend the lattice, they do not change who is whose neighbour.
+
+use super::{pyramid::Level, saddle::Saddle};
+
+/// Saddles numbered along two axes. In the image, the axis j lies clockwise of i, as y lies of x.
+#[derive(Clone, Debug)]
+pub(super) struct Lattice {
+    /// The nodes, by (j, i).
+    pub(super) nodes: Vec<Node>,
+    /// True where the cell between (0, 0) and (1, 1) is bright; cells alternate from there.
+    pub(super) origin_is_bright: bool,
+}
+
+/// A saddle and its number.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Node {
+    pub(super) i: i32,
+    pub(super) j: i32,
+    /// Index of the saddle.
+    pub(super) saddle: usize,
+}
+
+impl Lattice {
+    /// True where the cell between (i, j) and (i + 1, j + 1) is bright.
+    pub(super) fn is_bright(&self, i: i32, j: i32) -> bool {
+        self.origin_is_bright == ((i + j) % 2 == 0)
+    }
+}
+
+/// Neighbours lie at least this far apart, pixels of the level: below, their rings overlap.
+const MIN_SPACING: f32 = 4.5;
+/// A neighbour lies within this angle of the edge: cos 22°.
+const MIN_COS: f32 = 0.927;
+/// How many saddles in an edge's direction are tried, nearest first: markers add few that pass the cone.
+const MOST_TRIED: usize = 6;
+/// The difference across an edge, as a fraction of the contrast of the weaker end.
+const MIN_STEP: f32 = 0.25;
+
+/// Lattices with at least `min_nodes` nodes, largest first.
+pub(super) fn lattices(level: &Level, saddles: &[Saddle], min_nodes: usize) -> Vec<Lattice> {
+    let links = links(level, saddles);
+    let mut taken = vec![false; saddles.len()];
+    let mut found = Vec::new();
+    // Saddles come strongest first: numbering starts where the image is clearest.
+    for root in 0..saddles.len() {
+        if !taken[root] {
+            let lattice = grow(saddles, &links, root, &mut taken);
+            if lattice.nodes.len() >= min_nodes {
+                found.push(lattice);
+            }
+        }
+    }
+    found.sort_by_key(|lattice| std::cmp::Reverse(lattice.nodes.len()));
+    found
+}
+
+/// A link: the neighbour and which of its edges leads back.
+type Link = Option<(u32, u8)>;
+
+/// For every saddle and edge the neighbour that agrees.
+fn links(level: &Level, saddles: &[Saddle]) -> Vec<[Link; 4]> {
+    let grid = Buckets::new(level, saddles);
+    let mut one_way: Vec<[Link; 4]> = vec![[None; 4]; saddles.len()];
+    let mut near: Vec<(f32, u32)> = Vec::new();
+    for (p, links) in one_way.iter_mut().enumerate() {
+        // Rings of buckets outward until every edge has its neighbour; squares are seldom far larger than the
+        // distance to the nearest saddle, but markers lie between, hence the generous reach.
+        for reach in [1, 2, 4, 8] {
+            near.clear();
+            grid.near(saddles, p, reach, &mut near);
+            near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            for (k, link) in links.iter_mut().enumerate() {
+                if link.is_none() {
+                    *link = neighbour(level, saddles, p, k, &near);
+                }
+            }
+            if links.iter().all(Option::is_some) || reach >= grid.columns.max(grid.rows) {
+                break;
+            }
+        }
+    }
+    // Both ends must agree.
+    let mut mutual = one_way.clone();
+    for (p, links) in mutual.iter_mut().enumerate() {
+        for (k, link) in links.iter_mut().enumerate() {
+            if let Some((q, l)) = *link
+                && one_way[q as usize][l as usize] != Some((p as u32, k as u8))
+            {
+                *link = None;
+            }
+        }
+    }
+    mutual
+}
+
+/// The nearest saddle along edge `k` of `p` that could be its neighbour.
+fn neighbour(level: &Level, saddles: &[Saddle], p: usize, k: usize, near: &[(f32, u32)]) -> Link {
+    let here = &saddles[p];
+    let [ex, ey] = here.edges[k];
+    let mut tried = 0;
+    for &(distance, q) in near {
+        let there = &saddles[q as usize];
+        let (dx, dy) = (there.x - here.x, there.y - here.y);
+        if distance < MIN_SPACING || dx * ex + dy * ey < MIN_COS * distance {
+            continue;
+        }
+        tried += 1;
+        if tried > MOST_TRIED {
+            return None;
+        }
+        let (ux, uy) = (dx / distance, dy / distance);
+        let back = there.edges.iter().position(|[x, y]| -(ux * x + uy * y) > MIN_COS);
+        if let Some(l) = back
+            && here.is_bright_after(k) == there.is_bright_after((l + 3) % 4)
+            && is_edge(level, here, there, here.is_bright_after(k))
+        {
+            return Some((q, l as u8));
+        }
+    }
+    None
+}
+
+/// True where the line between two saddles separates bright from dark all the way.
+fn is_edge(level: &Level, a: &Saddle, b: &Saddle, bright_clockwise: bool) -> bool {
+    let (dx, dy) = (b.x - a.x, b.y - a.y);
+    let length = (dx * dx + dy * dy).sqrt();
+    // The side of ascending angle is (−dy, dx). Near enough to stay within the white rim round a marker, far enough
+    // to leave the blurred edge.
+    let offset = (0.11 * length).clamp(1.5, 5.0) / length;
+    let (nx, ny) = (-dy * offset, dx * offset);
+    let least = MIN_STEP * a.contrast.min(b.contrast);
+    let sign = if bright_clockwise { 1.0 } else { -1.0 };
+    [0.25, 0.5, 0.75].iter().all(|&t| {
+        let (x, y) = (a.x + t * dx, a.y + t * dy);
+        sign * (level.nearest(x + nx, y + ny) - level.nearest(x - nx, y - ny)) > least
+    })
+}
+
+/// Numbers everything that can be reached from `root`.
+fn grow(saddles: &[Saddle], links: &[[Link; 4]], root: usize, taken: &mut [bool]) -> Lattice {
+    // For each saddle reached: its number, and which of its edges points along +i.
+    let mut queue = std::collections::VecDeque::from([(root, 0_i32, 0_i32, 0_usize)]);
+    let mut nodes: Vec<Node> = Vec::new();
+    let mut occupied = std::collections::BTreeSet::from([(0, 0)]);
+    taken[root] = true;
+    let step = |axis: usize| [(1, 0), (0, 1), (-1, 0), (0, -1)][axis];
+    let mut bright_votes = 0_i32;
+    while let Some((p, i, j, first)) = queue.pop_front() {
+        nodes.push(Node { i, j, saddle: p });
+        // The sector from +i to +j is the cell (i, j).
+        let bright = saddles[p].is_bright_after(first) == ((i + j) % 2 == 0);
+        bright_votes += if bright { 1 } else { -1 };
+        for axis in 0..4 {
+            if let Some((q, back)) = links[p][(first + axis) % 4] {
+                let q = q as usize;
+                let (di, dj) = step(axis);
+                let place = (j + dj, i + di);
+                // First come, first numbered: a place taken twice, or a saddle reached with two numbers, is a wrong
+                // link somewhere; the later one is dropped.
+                if !taken[q] && occupied.insert(place) {
+                    taken[q] = true;
+                    // q's edge `back` points along −axis.
+                    let q_first = (usize::from(back) + 4 + 2 - axis) % 4;
+                    queue.push_back((q, i + di, j + dj, q_first));
+                }
+            }
+        }
+    }
+    nodes.sort_unstable_by_key(|n| (n.j, n.i));
+    Lattice { nodes, origin_is_bright: bright_votes > 0 }
+}
+
+/// Saddles by place.
+struct Buckets {
+    size: f32,
+    columns: usize,
+    rows: usize,
+    /// Where each bucket starts in `members`.
+    starts: Vec<u32>,
+    members: Vec<u32>,
+}
+
+impl Buckets {
+    fn new(level: &Level, saddles: &[Saddle]) -> Self {
+        let size = 16.0;
+        let columns = level.width / 16 + 1;
+        let rows = level.height / 16 + 1;
+        let bucket = |s: &Saddle| {
+            let column = ((s.x.max(0.0) / size) as usize).min(columns - 1);
+            let row = ((s.y.max(0.0) / size) as usize).min(rows - 1);
+            row * columns + column
+        };
+        let mut starts = vec![0_u32; columns * rows + 1];
+        for s in saddles {
+            starts[bucket(s) + 1] += 1;
+        }
+        for b in 0..columns * rows {
+            starts[b + 1] += starts[b];
+        }
+        let mut next = starts.clone();
+        let mut members = vec![0_u32; saddles.len()];
+        for (index, s) in saddles.iter().enumerate() {
+            let slot = &mut next[bucket(s)];
+            members[*slot as usize] = index as u32;
+            *slot += 1;
+        }
+        Self { size, columns, rows, starts, members }
+    }
+
+    /// All saddles but `p` within `reach` buckets of it, with their distances.
+    fn near(&self, saddles: &[Saddle], p: usize, reach: usize, out: &mut Vec<(f32, u32)>) {
+        let here = &saddles[p];
+        let column = ((here.x.max(0.0) / self.size) as usize).min(self.columns - 1);
+        let row = ((here.y.max(0.0) / self.size) as usize).min(self.rows - 1);
+        for r in row.saturating_sub(reach)..=(row + reach).min(self.rows - 1) {
+            let from = column.saturating_sub(reach);
+            let to = (column + reach).min(self.columns - 1);
+            let range =
+                self.starts[r * self.columns + from]..self.starts[r * self.columns + to + 1];
+            for &q in &self.members[range.start as usize..range.end as usize] {
+                if q as usize != p {
+                    let there = &saddles[q as usize];
+                    let (dx, dy) = (there.x - here.x, there.y - here.y);
+                    out.push(((dx * dx + dy * dy).sqrt(), q));
+                }
+            }
+        }
+    }
+}
