@@ -325,8 +325,11 @@ struct Expected<'a> {
 impl<'a> Expected<'a> {
     fn new(board: &'a CharucoBoard) -> Self {
         // With an odd number of rows the layouts are the same.
-        let layouts: &[Layout] =
-            if board.squares_y.is_multiple_of(2) { &[Layout::New, Layout::Legacy] } else { &[Layout::New] };
+        let layouts: &[Layout] = if board.squares_y.is_multiple_of(2) {
+            &[Layout::New, Layout::Legacy]
+        } else {
+            &[Layout::New]
+        };
         let n = board.dictionary.bits();
         let mut n_used = 0;
         let markers = layouts

@@ -32,13 +32,23 @@ impl SmoothMap {
         if n < 4 {
             return None;
         }
-        let mean =
-            |f: &dyn Fn(&([f64; 2], Pixel)) -> f64| corners.iter().map(f).sum::<f64>() / n as f64;
-        let center = [mean(&|c| c.0[0]), mean(&|c| c.0[1])];
-        let pixel_center = [mean(&|c| c.1.x), mean(&|c| c.1.y)];
-        let spread = mean(&|c| (c.0[0] - center[0]).abs() + (c.0[1] - center[1]).abs());
-        let pixel_spread =
-            mean(&|c| (c.1.x - pixel_center[0]).abs() + (c.1.y - pixel_center[1]).abs());
+        let (mut center, mut pixel_center) = ([0.0; 2], [0.0; 2]);
+        for ([x, y], q) in corners {
+            center = [center[0] + x / n as f64, center[1] + y / n as f64];
+            pixel_center = [pixel_center[0] + q.x / n as f64, pixel_center[1] + q.y / n as f64];
+        }
+        let (mut spread, mut pixel_spread, mut moments) = (0.0, 0.0, [0.0; 3]);
+        for ([x, y], q) in corners {
+            let (dx, dy) = (x - center[0], y - center[1]);
+            moments = [moments[0] + dx * dx, moments[1] + dx * dy, moments[2] + dy * dy];
+            spread += (dx.abs() + dy.abs()) / n as f64;
+            pixel_spread +=
+                ((q.x - pixel_center[0]).abs() + (q.y - pixel_center[1]).abs()) / n as f64;
+        }
+        let [xx, xy, yy] = moments;
+        if xx * yy - xy * xy < 1e-6 * (xx + yy) * (xx + yy) {
+            return None; // All on a line.
+        }
         if !(spread > 0.0 && pixel_spread > 0.0) {
             return None;
         }

@@ -30,7 +30,7 @@ pub(super) struct Saddle {
 impl Saddle {
     /// True where the sector that follows edge `k` is bright.
     pub(super) fn is_bright_after(&self, k: usize) -> bool {
-        self.first_is_bright == (k % 2 == 0)
+        self.first_is_bright == k.is_multiple_of(2)
     }
 }
 
