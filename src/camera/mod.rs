@@ -147,6 +147,7 @@ impl Camera {
 }
 
 #[cfg(test)]
+#[allow(clippy::needless_range_loop, reason = "rows and columns of a Jacobian read as such")]
 mod tests {
     use super::*;
 

@@ -259,6 +259,7 @@ impl TablePair {
 }
 
 #[cfg(test)]
+#[allow(clippy::needless_range_loop, reason = "rows and columns of a Jacobian read as such")]
 mod tests {
     use super::*;
 

@@ -1,1 +1,57 @@
-//! (skeleton)
+//! Least squares, robust losses, covariance and statistics; knows no cameras.
+//!
+//! A problem with few shared parameters and many independent blocks implements [`Bordered`]; wrapped as [`BySchur`] it
+//! is minimised by [`minimize`] (Levenberg-Marquardt). At the minimum each block is [`Reduced`] to what it says about
+//! the shared parameters; from these come covariances ([`classical`], [`clustered`]) and held-out errors
+//! ([`leave_one_out_rise`]).
+//!
+//! Residuals are *observed − predicted*, derivatives are those of the prediction.
+//!
+//! ```
+//! use truedepth::solve::{Arrow, BlockNormal, Bordered, BySchur, Effort, minimize};
+//!
+//! /// Lines of one common slope, each with its own offset.
+//! struct Lines([Vec<(f64, f64)>; 2]);
+//!
+//! impl Bordered<1, 1> for Lines {
+//!     type Block = f64;
+//!     fn linearize_block(&self, i: usize, [slope]: &[f64; 1], offset: &f64, n: &mut BlockNormal<1, 1>) -> bool {
+//!         for &(x, y) in &self.0[i] {
+//!             let residual = y - (slope * x + offset);
+//!             n.add_row(1.0, residual, &[x], &[1.0]);
+//!             n.add_cost(0.5 * residual * residual);
+//!         }
+//!         true
+//!     }
+//!     fn advance_block(&self, offset: &f64, [step]: &[f64; 1]) -> f64 {
+//!         offset + step
+//!     }
+//! }
+//!
+//! let lines = Lines([vec![(0.0, 1.0), (1.0, 3.0)], vec![(0.0, 5.0), (2.0, 9.0)]]);
+//! let start = Arrow { shared: [0.0], blocks: vec![0.0; 2] };
+//! let minimum = minimize(&BySchur(&lines), start, Effort::default()).expect("in the domain");
+//! assert!((minimum.state.shared[0] - 2.0).abs() < 1e-9);
+//! assert!((minimum.state.blocks[1] - 5.0).abs() < 1e-9);
+//! ```
+//!
+//! Not here: cameras, poses, pixels; large or sparse systems of other shapes.
+
+mod stats;
+
+mod loss;
+
+mod cholesky;
+
+mod lm;
+
+mod schur;
+
+mod covariance;
+
+pub use cholesky::Cholesky;
+pub use covariance::{classical, clustered, larger, leave_one_out_rise, total};
+pub use lm::{Effort, LeastSquares, Minimum, Solution, minimize};
+pub use loss::Loss;
+pub use schur::{Arrow, BlockNormal, Bordered, BySchur, Reduced};
+pub use stats::{mad_sigma, mean, median, quantile, rms, standard_deviation, standard_error};
