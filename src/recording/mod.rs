@@ -1,101 +1,216 @@
-//! Recordings as the capture apps write them: frames paired by time, factory metadata, limits. (skeleton: types only)
+//! Recordings as the capture apps write them: frames paired by time, factory metadata, limits.
+//!
+//! A [`Source`] hands over named files: a [`Folder`], a zip [`Archive`], or [`Memory`]. [`discover`] tells which
+//! recordings are in it, and [`Recording`] is one of them: its [`Frame`]s in order of time, each with the names of
+//! its images and its [`Factory`] metadata; what is odd but not fatal is listed as a [`Problem`]. Images are decoded
+//! when they are asked for, on as many threads as ask. A [`Writer`] puts frames into a [`Sink`] in the same format.
+//!
+//! Everything read is untrusted: names are checked, lengths and sizes are bounded by [`Limits`], and what does not
+//! fit is an [`Error`] with file, place and remedy. Lengths are metres and angles radians, whatever the files say;
+//! pixels are those of the depth map.
+//!
+//! ```
+//! # use std::sync::Arc;
+//! # use truedepth::{camera::Intrinsics, image::{DepthMap, Rgb}};
+//! use truedepth::recording::{Factory, Limits, Memory, Recording, Writer};
+//!
+//! # let intrinsics = Intrinsics { fx: 9.0, fy: 9.0, cx: 3.5, cy: 2.5, width: 8, height: 6 };
+//! # let factory = Factory::pinhole(intrinsics);
+//! # let (color, depth) = (Rgb::new(8, 6, vec![[7; 3]; 48]), DepthMap::new(8, 6, vec![0.25; 48]));
+//! let mut writer = Writer::new(Memory::new("example"));
+//! writer.frame(500, &color, &depth, &factory)?;
+//! let recording = Recording::from_source(Arc::new(writer.finish()?), &Limits::default())?;
+//! assert_eq!(recording.frames.len(), 1);
+//! assert_eq!(recording.depth(0)?.at(3, 3), 0.25);
+//! # Ok::<(), truedepth::recording::Error>(())
+//! ```
+//!
+//! Not here: what the images show, whether the metadata are true.
+
+mod archive;
+mod board_file;
+mod discover;
+mod error;
+#[cfg(feature = "fs")]
+mod folder;
+mod frame;
+mod json;
+mod limits;
+mod metadata;
+mod pairing;
+mod problem;
+mod source;
+mod write;
+mod zeiss;
+
+pub use archive::Archive;
+pub use board_file::board_from_toml;
+#[cfg(feature = "fs")]
+pub use discover::discover;
+pub use discover::{Found, discover_in};
+pub use error::Error;
+#[cfg(feature = "fs")]
+pub use folder::{Folder, FolderSink};
+pub use frame::{Factory, Frame};
+pub use limits::Limits;
+pub use problem::Problem;
+pub use source::{Memory, Source};
+pub use write::{Sink, Writer, encode_depth};
+
+use std::{fmt, sync::Arc};
 
 use crate::{
     board::CharucoBoard,
-    camera::{Intrinsics, TablePair},
-    geom::Pixel,
-    image::{DepthMap, Gray, Rgb},
+    image::{self, DepthMap, Gray, Rgb},
 };
 
 /// A recording: frames in order of time, what the files say about the camera, and what was odd in the files.
 /// Images are decoded only when asked for, so that memory does not grow with the number of frames.
-#[derive(Debug)]
 pub struct Recording {
-    /// Name of the folder or archive member, for people.
+    /// Name of the folder or archive, for people.
     pub name: String,
     /// The board, where the recording tells it.
     pub board: Option<CharucoBoard>,
-    /// Frames in order of time.
+    /// Frames in order of time: every time at which there is an image.
     pub frames: Vec<Frame>,
     /// What is odd, but not fatal.
     pub problems: Vec<Problem>,
-    // + private: the named readers (trait Source), limits
-}
-
-/// One moment: a colour image, its depth map and its metadata, each where present.
-#[derive(Clone, Debug)]
-pub struct Frame {
-    /// Time since the first frame of the recording, nanoseconds.
-    pub t_ns: i64,
-    /// The timestamp as written in the file (ZEISS app: milliseconds since boot). Names the frame for people.
-    pub timestamp: i64,
-    /// Name of the colour image inside the recording.
-    pub color: Option<String>,
-    /// Name of the depth image inside the recording.
-    pub depth: Option<String>,
-    /// What the factory says about the camera at this frame.
-    pub factory: Option<Factory>,
-}
-
-/// Factory metadata of one frame.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Factory {
-    /// Intrinsics at the size of the depth map.
-    pub intrinsics: Intrinsics,
-    /// `intrinsicMatrixReferenceDimensions`, pixels.
-    pub reference_dimensions: Option<[f64; 2]>,
-    /// Lens distortion centre at the size of the depth map (scaled as Apple scales the principal point).
-    pub distortion_center: Option<Pixel>,
-    /// Both lookup tables at the size of the depth map.
-    pub tables: Option<TablePair>,
-    /// Pixel size at the reference dimensions, metres.
-    pub pixel_size_m: Option<f64>,
-    /// Depth-to-colour pose as delivered: rows of [R|t], t in metres.
-    pub extrinsics: Option<[[f64; 4]; 3]>,
-    /// `depthDataAccuracy`: Some(true) = absolute.
-    pub depth_absolute: Option<bool>,
-    /// `isDepthDataFiltered`.
-    pub depth_filtered: Option<bool>,
-    /// `GeometricDistortionCorrectionEnabled` of the colour device.
-    pub geometric_distortion_correction: Option<bool>,
-    /// `DeviceType`, e.g. `AVCaptureDeviceTypeBuiltInTrueDepthCamera`.
-    pub device_type: Option<String>,
-    /// Horizontal field of view as the device format states it, radians.
-    pub field_of_view_rad: Option<f64>,
-}
-
-/// Something odd in the files that did not stop the reading.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Problem {
-    /// Metadata entries for which there is no image.
-    MetadataWithoutImages {
-        /// Timestamps as written.
-        timestamps: Vec<i64>,
-    },
-    // ...
+    /// The first metadata of the file, for recordings none of whose frames has its own.
+    fallback: Option<Factory>,
+    place: String,
+    prefix: String,
+    source: Arc<dyn Source>,
+    limits: Limits,
 }
 
 impl Recording {
+    /// Opens the one recording in a folder or zip archive. Several are an error that names them: see [`discover`].
+    #[cfg(feature = "fs")]
+    pub fn open(path: impl AsRef<std::path::Path>, limits: &Limits) -> Result<Self, Error> {
+        let path = path.as_ref();
+        discover::only(&path.display().to_string(), discover(path, limits)?)?.open()
+    }
+
+    /// Opens the one recording among the files of a source.
+    pub fn from_source(source: Arc<dyn Source>, limits: &Limits) -> Result<Self, Error> {
+        let place = source.place().to_owned();
+        discover::only(&place, discover_in(source, limits)?)?.open()
+    }
+
+    /// Where it is: the path of the folder or archive, and the folder inside.
+    pub fn place(&self) -> &str {
+        &self.place
+    }
+
+    /// The factory metadata that stand for the whole recording: those of the first frame that has any, else the
+    /// first of the file. Where they differ between frames `problems` says so.
+    pub fn factory(&self) -> Option<&Factory> {
+        self.frames.iter().find_map(|frame| frame.factory.as_ref()).or(self.fallback.as_ref())
+    }
+
     /// The colour image of a frame, as grey.
-    pub fn gray(&self, _frame: usize) -> Result<Gray, Error> {
-        Err(Error::Skeleton)
+    pub fn gray(&self, frame: usize) -> Result<Gray, Error> {
+        let gray = self.color(frame, Gray::from_png)?;
+        self.check_color(frame, [gray.width(), gray.height()])?;
+        Ok(gray)
     }
+
     /// The colour image of a frame.
-    pub fn rgb(&self, _frame: usize) -> Result<Rgb, Error> {
-        Err(Error::Skeleton)
+    pub fn rgb(&self, frame: usize) -> Result<Rgb, Error> {
+        let rgb = self.color(frame, Rgb::from_png)?;
+        self.check_color(frame, [rgb.width(), rgb.height()])?;
+        Ok(rgb)
     }
+
     /// The depth map of a frame.
-    pub fn depth(&self, _frame: usize) -> Result<DepthMap, Error> {
-        Err(Error::Skeleton)
+    pub fn depth(&self, frame: usize) -> Result<DepthMap, Error> {
+        let name = self.image(frame, "depth image", |frame| frame.depth.as_deref())?;
+        let bytes = self.file(name)?;
+        let depth = DepthMap::from_png(&bytes, zeiss::DEPTH_UNIT_M, &self.limits.image)
+            .map_err(|source| Error::Image { file: self.path(name), source })?;
+        let expected = self.frames[frame].factory.as_ref().map(Factory::size);
+        let size = [depth.width(), depth.height()];
+        self.check_size(frame, name, size, zeiss::DEPTH_METADATA, expected)?;
+        Ok(depth)
+    }
+
+    /// The bytes of any file of the recording, like those that [`Frame::color`] and [`Frame::depth`] name.
+    pub fn file(&self, name: &str) -> Result<Vec<u8>, Error> {
+        self.source.read(&format!("{}{name}", self.prefix), self.limits.file_bytes)
+    }
+
+    fn color<T>(
+        &self,
+        frame: usize,
+        decode: impl Fn(&[u8], &image::Limits) -> Result<T, image::Error>,
+    ) -> Result<T, Error> {
+        let name = self.image(frame, "colour image", |frame| frame.color.as_deref())?;
+        let bytes = self.file(name)?;
+        decode(&bytes, &self.limits.image)
+            .map_err(|source| Error::Image { file: self.path(name), source })
+    }
+
+    fn image(
+        &self,
+        frame: usize,
+        what: &'static str,
+        name: impl Fn(&Frame) -> Option<&str>,
+    ) -> Result<&str, Error> {
+        self.frames.get(frame).and_then(name).ok_or_else(|| Error::Absent {
+            path: self.place.clone(),
+            what,
+            frame,
+        })
+    }
+
+    /// The colour image must have the size that its own metadata say, and that of the depth map: the intrinsics
+    /// hold for no other.
+    fn check_color(&self, frame: usize, size: [usize; 2]) -> Result<(), Error> {
+        let Frame { color, color_size, factory, .. } = &self.frames[frame];
+        let name = color.as_deref().unwrap_or_default();
+        self.check_size(frame, name, size, zeiss::CAMERA_METADATA, *color_size)?;
+        self.check_size(
+            frame,
+            name,
+            size,
+            zeiss::DEPTH_METADATA,
+            factory.as_ref().map(Factory::size),
+        )
+    }
+
+    fn check_size(
+        &self,
+        frame: usize,
+        name: &str,
+        size: [usize; 2],
+        said_by: &str,
+        expected: Option<[usize; 2]>,
+    ) -> Result<(), Error> {
+        match expected {
+            Some(expected) if expected != size => Err(Error::ImageSize {
+                file: self.path(name),
+                size,
+                said_by: said_by.to_owned(),
+                expected,
+                timestamp: self.frames[frame].timestamp,
+            }),
+            _ => Ok(()),
+        }
+    }
+
+    /// A file of the recording, for messages.
+    fn path(&self, name: &str) -> String {
+        source::join(&self.place, name)
     }
 }
 
-/// skeleton
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum Error {
-    /// skeleton
-    #[error("skeleton")]
-    Skeleton,
+impl fmt::Debug for Recording {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Recording")
+            .field("place", &self.place)
+            .field("board", &self.board)
+            .field("frames", &self.frames.len())
+            .field("problems", &self.problems)
+            .finish_non_exhaustive()
+    }
 }

@@ -2,6 +2,7 @@
 //!
 //! Tests on real recordings ask [`data`] for them and end early, saying so, where the folder is absent.
 
+mod recording;
 mod tidy;
 
 use std::{
@@ -13,7 +14,6 @@ use std::{
 /// A file or folder of the shared data (`TRUEDEPTH_DATA`, else `../shared/data` beside the repository). Where the
 /// whole data folder is absent the answer is `None` and one line on stderr says what was skipped; where the folder is
 /// there but the file is not, the test fails: a misspelt name must not pass as "absent".
-#[expect(dead_code, reason = "the first module with real data removes this line")]
 fn data(relative: &str) -> Option<PathBuf> {
     let root = env::var_os("TRUEDEPTH_DATA").map_or_else(
         || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),

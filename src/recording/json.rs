@@ -1,0 +1,189 @@
+//! Arrays of records in JSON, with the place of whatever is wrong in them.
+
+use std::{fmt, marker::PhantomData};
+
+use serde::{
+    Deserialize, Deserializer,
+    de::{DeserializeOwned, DeserializeSeed, SeqAccess, Visitor},
+};
+
+use super::Error;
+
+/// All records of a file that is one JSON array.
+pub(super) fn records<T: DeserializeOwned>(file: &str, bytes: &[u8]) -> Result<Vec<T>, Error> {
+    let mut records = Vec::new();
+    let mut deserializer = serde_json::Deserializer::from_slice(bytes);
+    let result =
+        Records(&mut records).deserialize(&mut deserializer).and_then(|()| deserializer.end());
+    // The array may also end before its last record: then the next one is what is cut.
+    result.map_err(|error| locate(file, bytes, records.len() + 1, &error))?;
+    Ok(records)
+}
+
+fn locate(file: &str, bytes: &[u8], record: usize, error: &serde_json::Error) -> Error {
+    let file = file.to_owned();
+    if error.is_eof() {
+        return Error::MetadataCut { file, record, bytes: bytes.len() };
+    }
+    let (line, column) = (error.line(), error.column());
+    let why = error.to_string();
+    let why = why.strip_suffix(&format!(" at line {line} column {column}")).unwrap_or(&why);
+    let text = bytes.split(|&b| b == b'\n').nth(line.saturating_sub(1)).unwrap_or_default();
+    let text = shorten(String::from_utf8_lossy(text).trim());
+    Error::Metadata { file, record, line, column, why: shorten(why), text }
+}
+
+/// Files are untrusted: what is quoted from them must not fill the screen or steer the terminal.
+fn shorten(text: &str) -> String {
+    let mut short: String = text.chars().filter(|c| !c.is_control()).take(120).collect();
+    if text.chars().nth(120).is_some() {
+        short.push('…');
+    }
+    short
+}
+
+/// Collects the elements of an array one by one, so that those before an error are counted.
+struct Records<'a, T>(&'a mut Vec<T>);
+
+impl<'de, T: Deserialize<'de>> DeserializeSeed<'de> for Records<'_, T> {
+    type Value = ();
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
+        deserializer.deserialize_seq(self)
+    }
+}
+
+impl<'de, T: Deserialize<'de>> Visitor<'de> for Records<'_, T> {
+    type Value = ();
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("an array of records, `[{...},{...}]`")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<(), A::Error> {
+        while let Some(record) = seq.next_element()? {
+            self.0.push(record);
+        }
+        Ok(())
+    }
+}
+
+/// Numbers as the app writes tuples: a string `"(565.12317, 0.0, 320.60107)"`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Tuple<const N: usize>(pub(super) [f64; N]);
+
+impl<'de, const N: usize> Deserialize<'de> for Tuple<N> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_str(TupleVisitor(PhantomData::<[f64; N]>))
+    }
+}
+
+struct TupleVisitor<T>(PhantomData<T>);
+
+impl<const N: usize> Visitor<'_> for TupleVisitor<[f64; N]> {
+    type Value = Tuple<N>;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{N} finite numbers in a string, \"(1.0, 2.0, ...)\"")
+    }
+
+    fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<Tuple<N>, E> {
+        parse(text)
+            .map(Tuple)
+            .ok_or_else(|| E::invalid_value(serde::de::Unexpected::Str(text), &self))
+    }
+}
+
+fn parse<const N: usize>(text: &str) -> Option<[f64; N]> {
+    let inner = text.trim().strip_prefix('(')?.strip_suffix(')')?;
+    let mut numbers = [0.0; N];
+    let mut parts = inner.split(',');
+    for number in &mut numbers {
+        *number = parts.next()?.trim().parse().ok().filter(|v: &f64| v.is_finite())?;
+    }
+    parts.next().is_none().then_some(numbers)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Debug, Deserialize, PartialEq)]
+    struct Record {
+        #[serde(rename = "K")]
+        k: Tuple<2>,
+        #[serde(rename = "N")]
+        n: f64,
+    }
+
+    #[test]
+    fn tuples() {
+        for (text, expected) in [
+            ("(1.5, -2)", Some([1.5, -2.0])),
+            (" ( 1e2 ,3 ) ", Some([100.0, 3.0])),
+            ("(1.0)", None),
+            ("(1, 2, 3)", None),
+            ("(1, nan)", None),
+            ("(1, inf)", None),
+            ("(1, 1e999)", None),
+            ("1, 2", None),
+            ("(1, )", None),
+            ("", None),
+            ("(1, 2", None),
+        ] {
+            assert_eq!(parse::<2>(text), expected, "{text}");
+        }
+    }
+
+    #[test]
+    fn every_error_has_its_place() {
+        let good = r#"{"K": "(1, 2)", "N": 3, "unknown": [{}]}"#;
+        assert_eq!(records::<Record>("f", b"[]").unwrap(), []);
+        let two = records::<Record>("f", format!("[\n{good},{good}\n]\n").as_bytes()).unwrap();
+        assert_eq!(two[1], Record { k: Tuple([1.0, 2.0]), n: 3.0 });
+
+        let deep = "[".repeat(100_000);
+        // What stands after one good record, and what the message must say.
+        for (text, expected) in [
+            (",{\"K\": \"(1, 2)\",\n\"N\": NaN}]", &["f, record 2, line 3", "\"N\": NaN"][..]),
+            (
+                ",{\"K\": \"(1, 2)\",\n\"N\": \"3\"}]",
+                &["record 2, line 3", "string \"3\"", "`\"N\": \"3\"}]`"],
+            ),
+            (
+                ",{\"N\": 3,\n\"K\": \"(nan, 2)\"}]",
+                &["record 2, line 3", "2 finite numbers", "\"(nan, 2)\""],
+            ),
+            (",{\"K\": \"(1, 2)\",\n\"N\": 1e999}]", &["record 2, line 3", "out of range"]),
+            (",{\"N\": 3}]", &["record 2, line 2", "missing field `K`"]),
+            (",{\"K\": \"(1, 2)\", \"N\": 1, \"N\": 2}]", &["record 2", "duplicate field `N`"]),
+            (",7]", &["record 2", "integer `7`"]),
+            (
+                ",{\"K\": \"(1, 2)\",\n\"N\"",
+                &["f ends in the middle of record 2 (byte 62)", "keep its 1 whole"],
+            ),
+            (",", &["in the middle of record 2"]),
+            ("", &["in the middle of record 2"]),
+            ("] x", &["record 2, line 2", "trailing characters"]),
+            ("} ]", &["record 2", "expected `,` or `]`"]),
+            (deep.as_str(), &["record 2"]),
+        ] {
+            let message = records::<Record>("f", format!("[\n{good}{text}").as_bytes())
+                .unwrap_err()
+                .to_string();
+            for part in expected {
+                assert!(message.contains(part), "{text:.40}: {message}");
+            }
+            assert!(
+                message.contains("copy it from") || message.contains("copy the file"),
+                "{message}"
+            );
+        }
+        for (text, expected) in
+            [("", "record 1"), ("{}", "an array of records"), ("\u{1b}[2J", "line 1")]
+        {
+            let message = records::<Record>("f", text.as_bytes()).unwrap_err().to_string();
+            assert!(message.contains(expected) && !message.contains('\u{1b}'), "{message}");
+        }
+    }
+}

@@ -1,0 +1,170 @@
+//! The format of the capture app of Urban et al. (ZEISS/iPad_TrueDepth_Issue_App), the one format read so far.
+//!
+//! | file | content |
+//! |---|---|
+//! | `rgb_<ms>.png` | colour, 8-bit RGBA (RGB and grey are read too) |
+//! | `depth_<ms>.png` | 16-bit grey, 10⁻⁴ m each, 0 = no measurement |
+//! | `DepthMetadata.json` | one record per depth frame: intrinsics, distortion centre and tables |
+//! | `CameraMetadata.json` | one record per colour frame: device, field of view, distortion correction |
+//! | `board.toml`, `checkersize.txt` | the board, where somebody has described it |
+//! | `Accelerometer.txt`, `Gyroscope.txt` | not read |
+//!
+//! The app appends metadata from several threads without a lock, so their order means nothing, and a crash leaves
+//! them cut.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    mem,
+    sync::Arc,
+};
+
+use super::{
+    Error, Factory, Limits, Problem, Recording, Source, board_file, json,
+    metadata::{At, CameraRecord, DepthRecord},
+    pairing,
+    source::join,
+};
+
+pub(super) const DEPTH_METADATA: &str = "DepthMetadata.json";
+pub(super) const CAMERA_METADATA: &str = "CameraMetadata.json";
+pub(super) const BOARD: &str = "board.toml";
+pub(super) const CHECKER_SIZE: &str = "checkersize.txt";
+
+/// Metres per count of a depth image. (The paper's evaluation says 10⁻⁵ in a comment, and divides by 10⁴.)
+pub(super) const DEPTH_UNIT_M: f64 = 1e-4;
+
+/// Relative difference of intrinsics beyond which frames are said to differ: the app writes single precision.
+const FLOAT_NOISE: f64 = 1e-6;
+
+/// Whether a file of this name makes the folder it lies in a recording.
+pub(super) fn is_telltale(name: &str) -> bool {
+    name == DEPTH_METADATA || pairing::parse_name(name).is_some()
+}
+
+/// Whether this format has a file of this name.
+pub(super) fn is_ours(name: &str) -> bool {
+    is_telltale(name) || [CAMERA_METADATA, BOARD, CHECKER_SIZE].contains(&name)
+}
+
+/// The recording in `folder` of the source; empty: at its top.
+pub(super) fn open(
+    source: Arc<dyn Source>,
+    folder: &str,
+    name: String,
+    limits: &Limits,
+) -> Result<Recording, Error> {
+    let place = join(source.place(), folder);
+    let place = place.trim_end_matches('/').to_owned();
+    let prefix = if folder.is_empty() { String::new() } else { format!("{folder}/") };
+    let names: Vec<&str> = source
+        .names()
+        .iter()
+        .filter_map(|name| name.strip_prefix(prefix.as_str()).filter(|rest| !rest.contains('/')))
+        .collect();
+    let mut problems = Vec::new();
+    let images = pairing::images(names.iter().copied(), &mut problems);
+    if images.is_empty() {
+        return Err(Error::NoImages { path: place });
+    }
+    let read = |file: &'static str| -> Result<Option<Vec<u8>>, Error> {
+        if !names.contains(&file) {
+            return Ok(None);
+        }
+        source.read(&format!("{prefix}{file}"), limits.file_bytes).map(Some)
+    };
+
+    let mut depth_records = Vec::new();
+    match read(DEPTH_METADATA)? {
+        Some(bytes) => depth_records = json::records(&join(&place, DEPTH_METADATA), &bytes)?,
+        None => problems.push(Problem::MetadataMissing { file: DEPTH_METADATA }),
+    }
+    let mut camera_records = Vec::new();
+    match read(CAMERA_METADATA)? {
+        Some(bytes) => camera_records = json::records(&join(&place, CAMERA_METADATA), &bytes)?,
+        None => problems.push(Problem::MetadataMissing { file: CAMERA_METADATA }),
+    }
+    let board = match read(BOARD)? {
+        Some(bytes) => Some(board_file::from_toml(&join(&place, BOARD), &bytes)?),
+        None => match read(CHECKER_SIZE)? {
+            Some(bytes) => {
+                Some(board_file::from_checker_size(&join(&place, CHECKER_SIZE), &bytes)?)
+            }
+            None => None,
+        },
+    };
+
+    let time = |r: &DepthRecord| r.timestamp;
+    let depth_records = pairing::by_time(DEPTH_METADATA, depth_records, time, &mut problems);
+    let time = |r: &CameraRecord| r.timestamp;
+    let camera_records = pairing::by_time(CAMERA_METADATA, camera_records, time, &mut problems);
+    let timestamps: Vec<i64> =
+        depth_records.keys().filter(|t| !images.contains_key(t)).copied().collect();
+    if !timestamps.is_empty() {
+        problems.push(Problem::MetadataWithoutImages { timestamps });
+    }
+    for (file, known) in [
+        (DEPTH_METADATA, depth_records.keys().copied().collect::<BTreeSet<_>>()),
+        (CAMERA_METADATA, camera_records.keys().copied().collect()),
+    ] {
+        let timestamps: Vec<i64> = images.keys().filter(|t| !known.contains(t)).copied().collect();
+        // Where the whole file is missing that has been said.
+        if !(timestamps.is_empty() || problems.contains(&Problem::MetadataMissing { file })) {
+            problems.push(Problem::ImagesWithoutMetadata { file, timestamps });
+        }
+    }
+
+    // Every record is checked, also those without an image.
+    let (depth_file, camera_file) = (join(&place, DEPTH_METADATA), join(&place, CAMERA_METADATA));
+    let mut odd = Vec::new();
+    let mut factories = BTreeMap::new();
+    for (&timestamp, (record, depth)) in &depth_records {
+        let at = At { file: &depth_file, record: *record, timestamp };
+        factories.insert(timestamp, depth.factory(at, &mut odd)?);
+    }
+    for (&timestamp, (record, camera)) in &camera_records {
+        let at = At { file: &camera_file, record: *record, timestamp };
+        camera.complete(at, factories.get_mut(&timestamp))?;
+    }
+    // One mention of each kind is enough: all frames come from one camera.
+    odd.dedup_by_key(|problem| mem::discriminant(problem));
+    problems.extend(odd);
+    problems.extend(variation(factories.values()));
+
+    let fallback = factories.values().next().cloned();
+    let frames = pairing::frames(
+        images,
+        |t| Ok(factories.remove(&t)),
+        |t| {
+            let (_, camera) = camera_records.get(&t)?;
+            Some([camera.width as usize, camera.height as usize])
+        },
+    )?;
+    Ok(Recording {
+        name,
+        board,
+        frames,
+        problems,
+        fallback,
+        place,
+        prefix,
+        source,
+        limits: limits.clone(),
+    })
+}
+
+/// Whether the intrinsics of the frames differ.
+fn variation<'a>(factories: impl Iterator<Item = &'a Factory>) -> Option<Problem> {
+    let none = [f64::INFINITY, f64::NEG_INFINITY];
+    let [mut fx_px, mut cx_px, mut cy_px] = [none; 3];
+    for Factory { intrinsics: k, .. } in factories {
+        for (range, value) in [(&mut fx_px, k.fx), (&mut cx_px, k.cx), (&mut cy_px, k.cy)] {
+            *range = [range[0].min(value), range[1].max(value)];
+        }
+    }
+    let differ = |[low, high]: [f64; 2]| high - low > FLOAT_NOISE * high.abs();
+    [fx_px, cx_px, cy_px].into_iter().any(differ).then_some(Problem::IntrinsicsVary {
+        fx_px,
+        cx_px,
+        cy_px,
+    })
+}
