@@ -109,18 +109,24 @@ impl Camera {
         }
     }
 
-    /// Partial derivatives of [`project`](Self::project) (rows x, y, pixels) by the point (columns x, y, z, metres);
-    /// `None` where there is no projection.
-    pub fn d_pixel_d_point(&self, point: Point<Color>) -> Option<[[f64; 3]; 2]> {
+    /// The pixel of [`project`](Self::project) and its partial derivatives (rows x, y, pixels) by the point (columns
+    /// x, y, z, metres); `None` where there is no projection.
+    pub fn project_with_jacobian(&self, point: Point<Color>) -> Option<(Pixel, [[f64; 3]; 2])> {
         let pixel = self.project(point)?;
         let z = point.z();
         let [u, v] = [point.x() / z, point.y() / z];
+        let [[a, b], [c, d]] = self.d_pixel_d_ray([u, v], pixel)?;
+        let jacobian = [[a / z, b / z, -(a * u + b * v) / z], [c / z, d / z, -(c * u + d * v) / z]];
+        Some((pixel, jacobian))
+    }
+
+    /// Partial derivatives of `pixel` (rows x, y), where this direction is drawn, by the direction (columns).
+    fn d_pixel_d_ray(&self, ray: [f64; 2], pixel: Pixel) -> Option<[[f64; 2]; 2]> {
         let Intrinsics { fx, fy, .. } = self.intrinsics;
-        // d pixel / d ray
-        let [[a, b], [c, d]] = match &self.distortion {
+        Some(match &self.distortion {
             Distortion::None => [[fx, 0.0], [0.0, fy]],
             Distortion::Brown(brown) => {
-                let [[a, b], [c, d]] = brown.d_distorted_d_ray([u, v]);
+                let [[a, b], [c, d]] = brown.d_distorted_d_ray(ray);
                 [[fx * a, fx * b], [fy * c, fy * d]]
             }
             Distortion::Table(tables) => {
@@ -129,8 +135,7 @@ impl Camera {
                 let det = a * d - b * c;
                 [[fx * d / det, -fy * b / det], [-fx * c / det, fy * a / det]]
             }
-        };
-        Some([[a / z, b / z, -(a * u + b * v) / z], [c / z, d / z, -(c * u + d * v) / z]])
+        })
     }
 
     /// The direction (x/z, y/z) that the lens draws at this pixel; `None` outside the domain of the distortion
@@ -214,7 +219,8 @@ mod tests {
     fn jacobian_matches_differences() {
         for camera in battery() {
             for point in points() {
-                let analytic = camera.d_pixel_d_point(point).expect("in the domain");
+                let (pixel, analytic) = camera.project_with_jacobian(point).expect("in the domain");
+                assert_eq!(Some(pixel), camera.project(point));
                 let h = 1e-7 * point.z();
                 for column in 0..3 {
                     let [low, high] = [-h, h].map(|h| {
@@ -237,7 +243,7 @@ mod tests {
         for camera in battery() {
             for z in [0.0, -0.2, f64::NAN] {
                 assert!(camera.project(Point::new(0.01, 0.01, z)).is_none());
-                assert!(camera.d_pixel_d_point(Point::new(0.01, 0.01, z)).is_none());
+                assert!(camera.project_with_jacobian(Point::new(0.01, 0.01, z)).is_none());
             }
         }
     }
