@@ -120,6 +120,11 @@ impl Camera {
         Some((pixel, jacobian))
     }
 
+    /// The partial derivatives of [`project_with_jacobian`](Self::project_with_jacobian) alone.
+    pub fn d_pixel_d_point(&self, point: Point<Color>) -> Option<[[f64; 3]; 2]> {
+        Some(self.project_with_jacobian(point)?.1)
+    }
+
     /// Partial derivatives of `pixel` (rows x, y), where this direction is drawn, by the direction (columns).
     fn d_pixel_d_ray(&self, ray: [f64; 2], pixel: Pixel) -> Option<[[f64; 2]; 2]> {
         let Intrinsics { fx, fy, .. } = self.intrinsics;
