@@ -37,4 +37,5 @@ mod clustered;
 mod line;
 
 pub use against_board::{BoardDepth, FrameDepth, MAX_ERROR_M, Sample, against_board, sense};
+pub(crate) use clustered::{Clustered, Equation};
 pub use line::DepthLine;

@@ -1,6 +1,10 @@
-//! What a diagnosis starts from.
+//! What a diagnosis starts from, and the order of the checks.
 
-use super::{Device, DistortionState, Finding, Tolerances};
+use super::{
+    DistortionState, Finding, Tolerances, td101_files, td201_focal_length, td203_not_rectified,
+    td301_depth_scale, td302_depth_bias, td403_mirrored, td501_distortion_centre,
+    td503_intrinsics_size, td504_field_of_view,
+};
 use crate::{
     board::CharucoBoard,
     calibrate::Calibration,
@@ -44,8 +48,38 @@ pub struct Case<'a> {
     pub tolerances: Tolerances,
 }
 
+impl Case<'_> {
+    /// Frames in which the board was seen.
+    pub(super) fn n_seen(&self) -> usize {
+        self.observations.iter().filter(|o| !o.corners.is_empty()).count()
+    }
+
+    /// Why the own camera is not known, for the end of a sentence.
+    pub(super) fn why_no_camera(&self) -> String {
+        match self.no_calibration {
+            Some(why) => why.to_owned(),
+            None if self.n_seen() == 0 => "the board was not seen in any frame".to_owned(),
+            None => "the recording does not determine the camera".to_owned(),
+        }
+    }
+}
+
 /// One finding per check, in order of their codes, and what they say about the stream's distortion.
 pub fn diagnose(case: &Case<'_>) -> (Vec<Finding>, DistortionState) {
-    let _ = (case, Device::from_factory(case.factory));
-    (Vec::new(), DistortionState::Unknown)
+    let distortion = td203_not_rectified::measure(case);
+    let (not_rectified, state) = td203_not_rectified::check(case, distortion.as_ref());
+    // A focal length is comparable with the factory's only once the distortion is out of the way.
+    let focal = td201_focal_length::measure(case, distortion.as_ref(), state);
+    let findings = vec![
+        td101_files::check(case),
+        td201_focal_length::check(case, focal.as_ref()),
+        not_rectified,
+        td301_depth_scale::check(case, focal.as_ref()),
+        td302_depth_bias::check(case, focal.as_ref()),
+        td403_mirrored::check(case),
+        td501_distortion_centre::check(case),
+        td503_intrinsics_size::check(case),
+        td504_field_of_view::check(case),
+    ];
+    (findings, state)
 }

@@ -164,7 +164,33 @@ pub struct Finding {
     pub correction: Option<Correction>,
 }
 
+impl Evidence {
+    pub(super) const fn number(name: &'static str, value: f64) -> Self {
+        Self { name, value, sigma: None }
+    }
+
+    pub(super) const fn estimate(name: &'static str, Estimate { value, sigma }: Estimate) -> Self {
+        Self { name, value, sigma: Some(sigma) }
+    }
+}
+
 impl Finding {
+    /// Nothing known yet.
+    pub(super) const fn new(code: Code, unit: Unit) -> Self {
+        Self {
+            code,
+            verdict: Verdict::Unknown,
+            value: None,
+            sigma: None,
+            unit,
+            tolerance: None,
+            summary: String::new(),
+            evidence: Vec::new(),
+            what_to_do: String::new(),
+            correction: None,
+        }
+    }
+
     /// A few words that name the check, e.g. `Focal length`.
     pub fn title(&self) -> &'static str {
         self.code.title()

@@ -17,6 +17,17 @@ mod case;
 mod code;
 mod device;
 mod finding;
+mod joint;
+
+mod td101_files;
+mod td201_focal_length;
+mod td203_not_rectified;
+mod td301_depth_scale;
+mod td302_depth_bias;
+mod td403_mirrored;
+mod td501_distortion_centre;
+mod td503_intrinsics_size;
+mod td504_field_of_view;
 
 pub use case::{Case, diagnose};
 pub use code::{Code, UnknownCode};

@@ -1,0 +1,191 @@
+#![doc = include_str!("td201_focal_length.md")]
+
+use super::{
+    Case, Code, Correction, DistortionState, Evidence, Finding, Unit, Verdict,
+    joint::{Freedom, joint},
+    td203_not_rectified,
+};
+use crate::{calibrate::Estimate, camera::Distortion};
+
+/// The focal length that this recording speaks for, with everything that makes it unsure.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Measured {
+    /// Comparable with the factory's: lens distortion taken out.
+    pub(super) focal_px: Estimate,
+    /// As the own camera has it.
+    pub(super) own_px: f64,
+    /// Where it comes from.
+    origin: Origin,
+    /// From the fit's own covariance.
+    formal_sigma_px: Option<f64>,
+    /// From the scatter between views and between parts of the board.
+    clustered_sigma_px: Option<f64>,
+    /// Half the difference of both halves of the views.
+    split_half_sigma_px: Option<f64>,
+}
+
+impl Measured {
+    /// Standard deviation of the focal length as a fraction of it: every depth of the board carries it.
+    pub(super) fn relative_sigma(&self) -> f64 {
+        self.focal_px.sigma / self.focal_px.value
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Origin {
+    /// The own camera's, straight.
+    Own,
+    /// The own camera knows no distortion, the stream has some.
+    DistortionTakenOut,
+    /// Given from outside, taken as exact.
+    Given,
+}
+
+pub(super) fn measure(
+    case: &Case<'_>,
+    distortion: Option<&td203_not_rectified::Measured<'_>>,
+    state: DistortionState,
+) -> Option<Measured> {
+    let camera = case.camera?;
+    let own_px = camera.intrinsics.focal_px();
+    let Some(calibration) = case.calibration else {
+        return Some(Measured {
+            focal_px: Estimate { value: own_px, sigma: 0.0 },
+            own_px,
+            origin: Origin::Given,
+            formal_sigma_px: None,
+            clustered_sigma_px: None,
+            split_half_sigma_px: None,
+        });
+    };
+    let formal =
+        calibration.parameters.iter().find(|p| p.name == "focal_px").map(|p| p.estimate.sigma);
+    // Each half has √2 the sigma of the whole, their difference twice: half of it is one draw of the whole's error.
+    let split_half = calibration.split_half_focal_px.map(|[a, b]| (a.value - b.value).abs() / 2.0);
+    let pinhole = &camera.intrinsics;
+    let bent = state == DistortionState::Distorted && camera.distortion == Distortion::None;
+    let taken_out = if bent { distortion.and_then(|d| d.focal_px(case, pinhole)) } else { None };
+    let (value, clustered, origin) = match taken_out {
+        Some(estimate) => (estimate.value, Some(estimate.sigma), Origin::DistortionTakenOut),
+        None => {
+            let views: Vec<_> = calibration.views.iter().collect();
+            let lens = |pixel| Some(camera.project_ray(pinhole.ray_from_pixel(pixel))? - pixel);
+            let freedom = match camera.distortion {
+                Distortion::None | Distortion::Table(_) => Freedom::Focal,
+                Distortion::Brown(_) => Freedom::CentreAndDistortion,
+            };
+            let spread = joint(case.board, &views, pinhole, &lens, freedom);
+            (own_px, spread.map(|j| j.focal_px.sigma), Origin::Own)
+        }
+    };
+    // The worst of the three: each sees a kind of error that the others do not. With none of them nothing is known.
+    let sigma = [formal, clustered, split_half].into_iter().flatten().fold(f64::NAN, f64::max);
+    Some(Measured {
+        focal_px: Estimate { value, sigma },
+        own_px,
+        origin,
+        formal_sigma_px: formal,
+        clustered_sigma_px: clustered,
+        split_half_sigma_px: split_half,
+    })
+}
+
+pub(super) fn check(case: &Case<'_>, measured: Option<&Measured>) -> Finding {
+    let mut finding = Finding::new(Code::TD201, Unit::Percent);
+    finding.tolerance = Some(100.0 * case.tolerances.focal);
+    let record = "Record 20 or more frames moving round the board, tilted by 20 to 40 degrees in different directions: \
+                  from fronto-parallel views alone focal length and distance cannot be told apart.";
+    let factory_px = case.factory.map(|f| f.intrinsics.focal_px());
+    let (Some(measured), Some(factory_px)) = (measured, factory_px) else {
+        finding.summary = if factory_px.is_none() {
+            "Cannot tell whether the factory's focal length is right: the recording has no factory intrinsics."
+                .to_owned()
+        } else {
+            format!(
+                "Cannot tell whether the factory's focal length is right: {}.",
+                case.why_no_camera()
+            )
+        };
+        record.clone_into(&mut finding.what_to_do);
+        return finding;
+    };
+    let Estimate { value: focal_px, sigma: sigma_px } = measured.focal_px;
+    let difference = Estimate { value: focal_px / factory_px - 1.0, sigma: sigma_px / factory_px };
+    finding.verdict = Verdict::of(difference, case.tolerances.focal);
+    let (percent, percent_sigma) = (100.0 * difference.value, 100.0 * difference.sigma);
+    finding.value = Some(percent);
+    finding.sigma = (measured.origin != Origin::Given).then_some(percent_sigma);
+    finding.evidence = vec![
+        Evidence::number("factory_focal_px", factory_px),
+        Evidence { name: "focal_px", value: focal_px, sigma: finding.sigma.map(|_| sigma_px) },
+    ];
+    for (name, value) in [
+        ("sigma_of_fit_px", measured.formal_sigma_px),
+        ("sigma_between_views_and_board_parts_px", measured.clustered_sigma_px),
+        ("sigma_from_halves_px", measured.split_half_sigma_px),
+    ] {
+        finding.evidence.extend(value.map(|value| Evidence::number(name, value)));
+    }
+    let how = match measured.origin {
+        Origin::Given => "given from outside and taken as exact".to_owned(),
+        Origin::Own => {
+            format!("measured against the board, sigma the largest of {}", measured.sigmas())
+        }
+        Origin::DistortionTakenOut => {
+            finding
+                .evidence
+                .push(Evidence::number("focal_with_distortion_left_in_px", measured.own_px));
+            format!(
+                "measured with the stream's distortion taken out ({:.2} px with it left in), sigma the largest of {}",
+                measured.own_px,
+                measured.sigmas()
+            )
+        }
+    };
+    let spread = if measured.origin == Origin::Given {
+        String::new()
+    } else {
+        format!(" +- {percent_sigma:.2}")
+    };
+    let words = match finding.verdict {
+        Verdict::Fault => "The factory's focal length is wrong",
+        Verdict::Info => "The factory's focal length is right within the tolerance, if not exactly",
+        Verdict::Ok => "The factory's focal length is right",
+        Verdict::Unknown | Verdict::Warning => {
+            "Cannot tell whether the factory's focal length is right"
+        }
+    };
+    finding.summary = format!(
+        "{words}: {focal_px:.2} px instead of {factory_px:.2} px, {percent:+.2}{spread} % ({how}; tolerance {:.1} %).",
+        100.0 * case.tolerances.focal
+    );
+    match finding.verdict {
+        Verdict::Fault => {
+            finding.what_to_do = format!(
+                "Use {focal_px:.2} px. With the factory's value every point cloud is {} sideways by {:.1} %, and a pose \
+                 found from the image lies {} by as much.",
+                if difference.value < 0.0 { "too small" } else { "too large" },
+                percent.abs(),
+                if difference.value < 0.0 { "too far" } else { "too near" },
+            );
+            finding.correction = Some(Correction::Focal { focal_px });
+        }
+        Verdict::Unknown | Verdict::Warning => record.clone_into(&mut finding.what_to_do),
+        Verdict::Info | Verdict::Ok => {}
+    }
+    finding
+}
+
+impl Measured {
+    fn sigmas(&self) -> String {
+        [
+            ("the fit's own", self.formal_sigma_px),
+            ("the scatter between views and board parts", self.clustered_sigma_px),
+            ("half the difference of both halves", self.split_half_sigma_px),
+        ]
+        .into_iter()
+        .filter_map(|(name, sigma)| Some(format!("{name} {:.2} px", sigma?)))
+        .collect::<Vec<_>>()
+        .join(", ")
+    }
+}

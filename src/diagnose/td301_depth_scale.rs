@@ -1,0 +1,133 @@
+#![doc = include_str!("td301_depth_scale.md")]
+
+use super::{
+    Case, Code, Correction, Evidence, Finding, Unit, Verdict, td201_focal_length::Measured,
+};
+use crate::{calibrate::Estimate, depth::DepthLine};
+
+/// What to record for a line of depth over distance.
+pub(super) const RECORD: &str = "Record the board at several distances (0.2 m to 0.5 m), 20 or more frames, tilted in \
+                                 different directions, so that the focal length can be measured, too.";
+
+/// What the depth line says once the focal length's own uncertainty is added: the board's depth is proportional to
+/// the focal length, so that its relative sigma is one of the scale and of every offset, but none of the bias.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Scaled {
+    /// Scale minus one, from the slope over distance.
+    pub(super) slope: Estimate,
+    /// Sensor over board, minus one, at the mean distance: scale and bias together.
+    pub(super) ratio: Estimate,
+    /// Sensor minus board at the mean distance, metres.
+    pub(super) offset_m: Estimate,
+}
+
+impl Scaled {
+    pub(super) fn new(line: &DepthLine, focal: &Measured) -> Self {
+        let common = focal.relative_sigma();
+        let offset_sigma_m = line.offset_m.sigma.hypot(common * line.center_m);
+        Self {
+            slope: Estimate {
+                value: line.scale.value - 1.0,
+                sigma: line.scale.sigma.hypot(common),
+            },
+            ratio: Estimate {
+                value: line.offset_m.value / line.center_m,
+                sigma: offset_sigma_m / line.center_m,
+            },
+            offset_m: Estimate { value: line.offset_m.value, sigma: offset_sigma_m },
+        }
+    }
+}
+
+/// Why the sensor cannot be judged, with what was seen under the factory's focal length.
+pub(super) fn why_unknown(case: &Case<'_>) -> String {
+    let mut why = if case.camera.is_none() {
+        format!("the camera's own focal length is not known ({})", case.why_no_camera())
+    } else if case.own_depth.is_none_or(|d| d.frames.iter().all(|f| f.samples.is_empty())) {
+        "no frame has depth at the corners of the board".to_owned()
+    } else {
+        "there are too few depth samples on the board, or all at one distance".to_owned()
+    };
+    if let Some(mean) = case.factory_depth.and_then(|d| d.mean_of_medians_m) {
+        why += &format!(
+            "; with the factory's focal length the sensor is {:.2} mm too {}, but a wrong focal length would look just \
+             so",
+            1e3 * mean.value.abs(),
+            if mean.value > 0.0 { "near" } else { "far" },
+        );
+    }
+    why
+}
+
+pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
+    let mut finding = Finding::new(Code::TD301, Unit::Percent);
+    finding.tolerance = Some(100.0 * case.tolerances.depth_scale);
+    let line = case.own_depth.and_then(|d| d.line.as_ref());
+    let (Some(line), Some(focal)) = (line, focal) else {
+        finding.summary =
+            format!("Cannot tell whether depth has the right scale: {}.", why_unknown(case));
+        RECORD.clone_into(&mut finding.what_to_do);
+        return finding;
+    };
+    let Scaled { slope, ratio, .. } = Scaled::new(line, focal);
+    let by_slope = Verdict::of(slope, case.tolerances.depth_scale);
+    let by_ratio = Verdict::of(ratio, case.tolerances.depth_scale);
+    let [near_m, far_m] = line.range_m;
+    // The slope tells a scale from a bias. Where it is too uncertain, depth at the recorded distances still is true or
+    // not, and a scale error there could hide only behind a bias that makes up for it.
+    let (verdict, deviation, basis) = if by_slope == Verdict::Unknown {
+        (
+            by_ratio,
+            ratio,
+            "mean ratio of sensor to board; the distances are too alike to tell a scale from a bias",
+        )
+    } else {
+        (by_slope, slope, "slope of a robust line of sensor over board")
+    };
+    finding.verdict = verdict;
+    finding.value = Some(100.0 * deviation.value);
+    finding.sigma = Some(100.0 * deviation.sigma);
+    finding.evidence = vec![
+        Evidence::estimate("scale", line.scale),
+        Evidence::estimate(
+            "ratio_at_center",
+            Estimate { value: 1.0 + ratio.value, sigma: ratio.sigma },
+        ),
+        Evidence::number("relative_sigma_of_focal", focal.relative_sigma()),
+        Evidence::number("nearest_m", near_m),
+        Evidence::number("farthest_m", far_m),
+        Evidence::number("n_samples", line.n_samples as f64),
+        Evidence::number("n_frames", line.n_frames as f64),
+    ];
+    let words = match verdict {
+        Verdict::Fault if deviation.value > 0.0 => "Depth is too long",
+        Verdict::Fault => "Depth is too short",
+        Verdict::Info => "Depth has the right scale within the tolerance, if not exactly",
+        Verdict::Ok => "Depth has the right scale",
+        Verdict::Unknown | Verdict::Warning => "Cannot tell whether depth has the right scale",
+    };
+    finding.summary = format!(
+        "{words}: {:+.2} +- {:.2} % between {near_m:.2} m and {far_m:.2} m ({basis}; sigma includes {:.2} % of the focal \
+         length; {} samples in {} frames; tolerance {:.1} %).",
+        100.0 * deviation.value,
+        100.0 * deviation.sigma,
+        100.0 * focal.relative_sigma(),
+        line.n_samples,
+        line.n_frames,
+        100.0 * case.tolerances.depth_scale,
+    );
+    match verdict {
+        Verdict::Fault => {
+            let scale = 1.0 + deviation.value;
+            finding.what_to_do = format!(
+                "Divide depth by {scale:.4}. Make sure first that the board's squares really measure {:.3} mm: a board \
+                 printed at another scale looks just so.",
+                1e3 * case.board.square_m
+            );
+            finding.correction = Some(Correction::Depth { scale, bias_m: 0.0 });
+        }
+        Verdict::Unknown | Verdict::Warning => RECORD.clone_into(&mut finding.what_to_do),
+        Verdict::Info | Verdict::Ok => {}
+    }
+    finding
+}

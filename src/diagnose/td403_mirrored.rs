@@ -1,0 +1,45 @@
+#![doc = include_str!("td403_mirrored.md")]
+
+use super::{Case, Code, Correction, Evidence, Finding, Unit, Verdict};
+
+pub(super) fn check(case: &Case<'_>) -> Finding {
+    let mut finding = Finding::new(Code::TD403, Unit::Count);
+    let identified: Vec<_> = case.observations.iter().filter_map(|o| o.identity.as_ref()).collect();
+    let n = identified.len();
+    let mirrored = identified.iter().filter(|i| i.mirrored).count();
+    if n == 0 {
+        finding.summary =
+            "Cannot tell whether the images are mirrored: the board was not seen in any frame."
+                .to_owned();
+        finding.what_to_do =
+            "Record frames that show the board sharp and from the front.".to_owned();
+        return finding;
+    }
+    finding.value = Some(mirrored as f64);
+    finding.evidence = vec![
+        Evidence::number("n_mirrored", mirrored as f64),
+        Evidence::number("n_identified", n as f64),
+    ];
+    // The markers decode one way only; a single frame against all others is more likely a slip than a mirror.
+    if 2 * mirrored > n {
+        finding.verdict = Verdict::Fault;
+        finding.summary = format!(
+            "The images are mirrored: in {mirrored} of {n} frames the markers read only as in a mirror."
+        );
+        finding.what_to_do = "Mirror colour and depth back, and the principal point with them. Make sure first that \
+                              the board is not printed mirrored or seen through its back."
+            .to_owned();
+        finding.correction = Some(Correction::Unmirror);
+    } else if mirrored > 0 {
+        finding.verdict = Verdict::Warning;
+        finding.summary = format!(
+            "{mirrored} of {n} frames look mirrored and the others do not: frames of two kinds, or a wrong reading."
+        );
+        finding.what_to_do = "Look at these frames.".to_owned();
+    } else {
+        finding.verdict = Verdict::Ok;
+        finding.summary =
+            format!("The images are not mirrored: the markers read straight in all {n} frames.");
+    }
+    finding
+}
