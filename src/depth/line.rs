@@ -141,5 +141,5 @@ fn weighted_line(points: &[[f64; 2]], weight: &dyn Fn(&[f64; 2]) -> f64) -> Opti
         wxy += each * (point[0] - mx) * (point[1] - my);
     }
     let slope = wxy / wxx;
-    slope.is_finite().then(|| [my - slope * mx, slope])
+    slope.is_finite().then_some([my - slope * mx, slope])
 }

@@ -45,8 +45,45 @@ impl Device {
             Some(name) if name.contains("LiDAR") => Sensor::Lidar,
             _ => Sensor::Unknown,
         };
-        Self { sensor, device_type, model: None }
+        Self { sensor, device_type, model: factory.and_then(model) }
     }
+}
+
+/// Reference dimensions, the range of depth focal lengths at them with 1 % to either side, and whose camera this is.
+const MODELS: &[([f64; 2], [f64; 2], &str)] = &[
+    (
+        [2016.0, 1512.0],
+        [1762.0, 1809.0],
+        "iPad Pro 11-inch 3rd or 12.9-inch 5th generation (12 MP ultra wide)",
+    ),
+    (
+        [2880.0, 2160.0],
+        [1895.0, 1945.0],
+        "iPad Pro 11-inch 3rd or 12.9-inch 5th generation (12 MP ultra wide), by ARKit",
+    ),
+    ([3088.0, 2316.0], [2843.0, 2915.0], "iPad Pro 11-inch 2nd or 12.9-inch 4th generation (7 MP)"),
+    (
+        [3248.0, 2436.0],
+        [2843.0, 2915.0],
+        "iPad Pro 11-inch 2nd or 12.9-inch 4th generation (7 MP), by ARKit",
+    ),
+    (
+        [4032.0, 3024.0],
+        [2694.0, 2779.0],
+        "iPhone 11 Pro or a later one with its front camera (12 MP)",
+    ),
+];
+
+/// Whose front camera has these numbers; `None` for any other camera.
+fn model(factory: &Factory) -> Option<&'static str> {
+    let [width, height] = factory.reference_dimensions?;
+    let focal_px = factory.intrinsics.fx * width / factory.intrinsics.width as f64;
+    MODELS
+        .iter()
+        .find(|(size, [least, most], _)| {
+            *size == [width, height] && (*least..=*most).contains(&focal_px)
+        })
+        .map(|(.., name)| *name)
 }
 
 /// Whether the stream still carries the lens' distortion.
@@ -71,5 +108,72 @@ impl DistortionState {
             Self::RectifiedTwice => "rectified_twice",
             Self::Unknown => "unknown",
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Intrinsics;
+
+    #[test]
+    fn known_cameras() {
+        for (reference, focal_px, device_type, sensor, model) in [
+            (
+                [3088.0, 2316.0],
+                595.34,
+                "AVCaptureDeviceTypeBuiltInTrueDepthCamera",
+                Sensor::TrueDepth,
+                Some("4th"),
+            ),
+            (
+                [2016.0, 1512.0],
+                565.12,
+                "AVCaptureDeviceTypeBuiltInTrueDepthCamera",
+                Sensor::TrueDepth,
+                Some("5th"),
+            ),
+            (
+                [4032.0, 3024.0],
+                436.50,
+                "AVCaptureDeviceTypeBuiltInTrueDepthCamera",
+                Sensor::TrueDepth,
+                Some("11 Pro"),
+            ),
+            (
+                [4032.0, 3024.0],
+                500.00,
+                "AVCaptureDeviceTypeBuiltInLiDARDepthCamera",
+                Sensor::Lidar,
+                None,
+            ),
+            (
+                [1920.0, 1440.0],
+                436.50,
+                "AVCaptureDeviceTypeBuiltInDualCamera",
+                Sensor::Unknown,
+                None,
+            ),
+        ] {
+            let intrinsics = Intrinsics {
+                fx: focal_px,
+                fy: focal_px,
+                cx: 320.0,
+                cy: 240.0,
+                width: 640,
+                height: 480,
+            };
+            let mut factory = Factory::pinhole(intrinsics);
+            factory.reference_dimensions = Some(reference);
+            factory.device_type = Some(device_type.to_owned());
+            let device = Device::from_factory(Some(&factory));
+            assert_eq!(device.sensor, sensor);
+            assert_eq!(device.model.is_some(), model.is_some(), "{device:?}");
+            assert!(
+                device.model.unwrap_or_default().contains(model.unwrap_or_default()),
+                "{device:?}"
+            );
+        }
+        assert_eq!(Device::from_factory(None).sensor, Sensor::Unknown);
     }
 }

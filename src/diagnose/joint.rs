@@ -286,3 +286,173 @@ fn solve_scaled(normal: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f
     }
     Some(factor.solve(&right.component_mul(&scale)).component_mul(&scale))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        camera::{Brown, Camera, Distortion, RadialTable, TablePair},
+        detect::Corner,
+        geom::{Board, Color, Pose, Rotation},
+        pose::Weighting,
+    };
+
+    struct Noise(u64);
+    impl Noise {
+        fn uniform(&mut self) -> f64 {
+            self.0 = self
+                .0
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (self.0 >> 11) as f64 / (1u64 << 53) as f64
+        }
+        fn normal(&mut self) -> f64 {
+            (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+        }
+    }
+
+    fn pinhole(focal_px: f64) -> Intrinsics {
+        Intrinsics { fx: focal_px, fy: focal_px, cx: 318.9, cy: 239.8, width: 640, height: 480 }
+    }
+
+    /// Like the iPad's: 4 px at the corner.
+    fn tables() -> TablePair {
+        let table = (0..42).map(|i| -0.01 * (f64::from(i) / 41.0).powi(2)).collect();
+        TablePair::from_inverse(RadialTable::new(Pixel::new(318.9, 239.8), 400.0, table).unwrap())
+    }
+
+    /// Corners that `truth` sees of a board that may be wavy, with poses fitted by another camera.
+    fn views(
+        board: &CharucoBoard,
+        truth: &Camera,
+        fitted: &Camera,
+        wave_m: f64,
+        seed: u64,
+    ) -> Vec<View> {
+        let mut noise = Noise(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+        let mut views = Vec::new();
+        for frame in 0..20 {
+            let axis = Vector3::new(noise.normal(), noise.normal(), 0.0).normalize();
+            let rotation = Rotation::from_scaled_axis(axis * (0.3 + 0.4 * noise.uniform()))
+                * Rotation::from_scaled_axis(Vector3::z() * noise.uniform());
+            let centre = Vector3::new(0.104, 0.0835, 0.0);
+            let target = Vector3::new(
+                0.05 * noise.normal(),
+                0.04 * noise.normal(),
+                0.28 + 0.12 * noise.uniform(),
+            );
+            let pose: Pose<Color, Board> = Pose::new(rotation, target - rotation * centre);
+            let corners: Vec<Corner> = (0..board.n_corners())
+                .filter_map(|id| {
+                    let (column, row) = board.corner_cell(id);
+                    let mut point = board.corner(id);
+                    point.coords.z =
+                        wave_m * (0.8 * column as f64).sin() * (0.7 * row as f64).cos();
+                    let seen = truth.project(pose * point)?;
+                    let pixel =
+                        Pixel::new(seen.x + 0.05 * noise.normal(), seen.y + 0.05 * noise.normal());
+                    let inside = (0.0..640.0).contains(&pixel.x) && (0.0..480.0).contains(&pixel.y);
+                    inside.then_some(Corner { id, pixel, sigma_px: 0.05 })
+                })
+                .collect();
+            views.extend(View::from_corners(frame, board, fitted, &corners, Weighting::Equal).ok());
+        }
+        views
+    }
+
+    fn run(truth: &Camera, fitted: &Camera, shape: Shape<'_>, wave_m: f64, seed: u64) -> Joint {
+        let board = CharucoBoard::paper(0.020875).unwrap();
+        let views = views(&board, truth, fitted, wave_m, seed);
+        let views: Vec<_> = views.iter().collect();
+        joint(&board, &views, &fitted.intrinsics, shape, Freedom::CentreAndDistortion).unwrap()
+    }
+
+    #[test]
+    fn tells_a_distorted_stream_from_a_rectified_one() {
+        let tables = tables();
+        let shape = |p| Some(tables.distort(p)? - p);
+        let straight = Camera { intrinsics: pinhole(596.0), distortion: Distortion::None };
+        let bent =
+            Camera { intrinsics: pinhole(596.0), distortion: Distortion::Table(tables.clone()) };
+        // Poses fitted with the wrong focal length and the wrong lens must not matter.
+        let fits = [
+            straight.clone(),
+            bent.clone(),
+            Camera { intrinsics: pinhole(602.0), distortion: Distortion::None },
+        ];
+        for fitted in &fits {
+            for (truth, amount) in [(&straight, 0.0), (&bent, 1.0)] {
+                let joint = run(truth, fitted, &shape, 0.0, 1);
+                assert!((joint.amount.value - amount).abs() < 0.02, "{amount}: {joint:?}");
+                assert!(joint.amount.sigma < 0.02, "{joint:?}");
+                assert!((joint.focal_px.value - 596.0).abs() < 1.5, "{joint:?}");
+                let (better, worse) = if amount == 0.0 {
+                    (joint.rms_without_px, joint.rms_with_px)
+                } else {
+                    (joint.rms_with_px, joint.rms_without_px)
+                };
+                assert!(better < 0.08 && worse > 2.0 * better, "{joint:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_wavy_board_widens_the_sigmas() {
+        let tables = tables();
+        let shape = |p| Some(tables.distort(p)? - p);
+        let bent =
+            Camera { intrinsics: pinhole(596.0), distortion: Distortion::Table(tables.clone()) };
+        let (mut of_focal, mut of_amount) = (0.0, 0.0);
+        let n = 60;
+        for seed in 0..n {
+            let joint = run(&bent, &bent, &shape, 0.0008, seed + 1);
+            of_focal += ((joint.focal_px.value - 596.0) / joint.focal_px.sigma).powi(2);
+            of_amount += ((joint.amount.value - 1.0) / joint.amount.sigma).powi(2);
+        }
+        let (of_focal, of_amount) = ((of_focal / n as f64).sqrt(), (of_amount / n as f64).sqrt());
+        // RMS of errors over their sigmas: 1 where the sigmas are honest. With corners taken as independent it is 2.1.
+        assert!(
+            (0.5..1.5).contains(&of_focal) && (0.5..1.5).contains(&of_amount),
+            "{of_focal} {of_amount}"
+        );
+    }
+
+    #[test]
+    fn a_strong_lens_without_a_table() {
+        let brown = Brown { k1: 0.07, k2: -0.1, p1: 0.0, p2: 0.0, k3: 0.0 };
+        let bent = Camera { intrinsics: pinhole(436.5), distortion: Distortion::Brown(brown) };
+        let own = |p| Some(bent.project_ray(bent.intrinsics.ray_from_pixel(p))? - p);
+        let joint = run(&bent, &bent, &own, 0.0, 3);
+        assert!((joint.amount.value - 1.0).abs() < 3.0 * joint.amount.sigma + 0.01, "{joint:?}");
+    }
+
+    #[test]
+    fn fronto_parallel_views_do_not_tell() {
+        let board = CharucoBoard::paper(0.020875).unwrap();
+        let camera = Camera { intrinsics: pinhole(596.0), distortion: Distortion::None };
+        let views: Vec<View> = (0..5)
+            .map(|frame| {
+                let mut noise = Noise(frame as u64 + 1);
+                let pose: Pose<Color, Board> = Pose::new(
+                    Rotation::identity(),
+                    Vector3::new(-0.1, -0.08, 0.3 + 0.0003 * frame as f64),
+                );
+                let corners: Vec<Corner> = (0..board.n_corners())
+                    .filter_map(|id| {
+                        let seen = camera.project(pose * board.corner(id))?;
+                        let pixel = Pixel::new(
+                            seen.x + 0.05 * noise.normal(),
+                            seen.y + 0.05 * noise.normal(),
+                        );
+                        Some(Corner { id, pixel, sigma_px: 0.05 })
+                    })
+                    .collect();
+                View::from_corners(frame, &board, &camera, &corners, Weighting::Equal).unwrap()
+            })
+            .collect();
+        let views: Vec<_> = views.iter().collect();
+        let flat = |_| Some([0.0; 2]);
+        let found = joint(&board, &views, &camera.intrinsics, &flat, Freedom::Focal);
+        assert!(found.is_none_or(|j| j.focal_px.sigma > 0.05 * 596.0), "{found:?}");
+    }
+}
