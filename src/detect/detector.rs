@@ -4,12 +4,12 @@ use crate::{board::CharucoBoard, geom::Pixel, image::Gray};
 
 use super::{
     Corner, Identity, Observation, Reason, Reject,
-    identify::{NotIdentified, Placement, identify},
+    identify::{Expected, NotIdentified, Placement},
     lattice::{Lattice, lattices},
     map::SmoothMap,
     pyramid::Level,
-    refine::{Guess, noise_sigma, refine},
-    saddle::{Saddle, saddles},
+    refine::{Guess, Scales, refine},
+    saddle::saddles,
 };
 
 /// Finds a board in images.
@@ -18,6 +18,7 @@ use super::{
 #[derive(Clone, Debug)]
 pub struct Detector {
     board: CharucoBoard,
+    expected: Expected,
 }
 
 /// Saddles kept at most, for every million pixels of a level and at least: boards have at most a few hundred corners,
@@ -36,7 +37,7 @@ const MAX_SIGMA_PX: f64 = 0.7;
 impl Detector {
     /// A detector for this board. Its layout is found from the image; the one the board states only breaks ties.
     pub fn new(board: &CharucoBoard) -> Self {
-        Self { board: board.clone() }
+        Self { board: board.clone(), expected: Expected::new(board) }
     }
 
     /// The board that is sought.
@@ -47,10 +48,11 @@ impl Detector {
     /// The board's corners in `image`. May miss, does not invent.
     pub fn detect(&self, image: &Gray) -> Observation {
         let mut rejects = Vec::new();
+        let mut scales = Scales::new(image);
         let mut best: Option<Found> = None;
         for factor in factors(image) {
             let Some(level) = Level::new(image, factor) else { continue };
-            let found = self.search(image, &level, &mut rejects);
+            let found = self.search(&mut scales, &level, &mut rejects);
             if let Some(found) = found
                 && best.as_ref().is_none_or(|b| found.lattice.nodes.len() > b.lattice.nodes.len())
             {
@@ -61,65 +63,88 @@ impl Detector {
             }
         }
         match best {
-            Some(found) => self.collect(image, &found, rejects),
+            Some(found) => self.collect(&mut scales, &found, rejects),
             None => Observation { corners: Vec::new(), identity: None, rejects },
         }
     }
 
     /// Identifies the best lattice of one level.
-    fn search(&self, image: &Gray, level: &Level, rejects: &mut Vec<Reject>) -> Option<Found> {
+    fn search(
+        &self,
+        scales: &mut Scales<'_>,
+        level: &Level,
+        rejects: &mut Vec<Reject>,
+    ) -> Option<Found> {
         let mpx = (level.width * level.height) as f64 * 1e-6;
         let most = ((MOST_SADDLES_PER_MPX * mpx) as usize).max(LEAST_MOST_SADDLES);
         let saddles = saddles(level, most);
         let mut identified: Option<Found> = None;
-        for lattice in lattices(level, &saddles, MIN_NODES).into_iter().take(MOST_LATTICES) {
-            let place = |s: &Saddle| level.to_image(s.x, s.y);
-            let middle =
-                |lattice: &Lattice| place(&saddles[lattice.nodes[lattice.nodes.len() / 2].saddle]);
+        for mut lattice in lattices(level, &saddles, MIN_NODES).into_iter().take(MOST_LATTICES) {
             if identified.is_some() {
-                rejects.push(Reject { pixel: middle(&lattice), reason: Reason::SecondLattice });
+                rejects.push(Reject { pixel: lattice.middle(), reason: Reason::SecondLattice });
                 continue;
             }
-            let nodes: Vec<([f64; 2], Pixel)> = lattice
-                .nodes
-                .iter()
-                .map(|n| ([f64::from(n.i), f64::from(n.j)], place(&saddles[n.saddle])))
-                .collect();
-            let Some(map) = SmoothMap::fit(&nodes) else { continue };
-            let mut contrasts: Vec<f32> =
-                lattice.nodes.iter().map(|n| saddles[n.saddle].contrast).collect();
-            contrasts.sort_unstable_by(f32::total_cmp);
-            let contrast = f64::from(contrasts[contrasts.len() / 2]);
-            match identify(&self.board, image, &lattice, &map, contrast) {
-                Ok(placement) => identified = Some(Found { lattice, placement, nodes }),
+            let Some(map) = lattice.map() else { continue };
+            let placement = self.expected.by_bits(scales.image(), &lattice, &map).or_else(|_| {
+                let contrast = lattice.contrast;
+                // A larger lattice has more votes: look where its neighbours should be.
+                lattice.extend(self.board.n_corners(), |map, i, j| {
+                    self.node(scales, map, i, j, contrast)
+                });
+                let map = lattice.map().ok_or(NotIdentified::Ambiguous)?;
+                self.expected.by_effort(scales.image(), &lattice, &map)
+            });
+            match placement {
+                Ok(placement) => identified = Some(Found { lattice, placement }),
                 Err(why) => {
                     let reason = match why {
                         NotIdentified::NoMarkers => Reason::NoMarkers,
                         NotIdentified::Ambiguous => Reason::Ambiguous,
                     };
-                    rejects.push(Reject { pixel: middle(&lattice), reason });
+                    rejects.push(Reject { pixel: lattice.middle(), reason });
                 }
             }
         }
         identified
     }
 
+    /// The corner that the map expects at (i, j), if the image shows one.
+    fn node(
+        &self,
+        scales: &mut Scales<'_>,
+        map: &SmoothMap,
+        i: i32,
+        j: i32,
+        contrast: f64,
+    ) -> Option<Pixel> {
+        let (x, y) = (f64::from(i), f64::from(j));
+        let (predicted, axes) = (map.at(x, y)?, map.axes(x, y)?);
+        if !inside(scales.image(), predicted) {
+            return None;
+        }
+        self.corner(scales, predicted, axes, contrast).ok().map(|(pixel, _)| pixel)
+    }
+
     /// Refines every corner that the identified board shows.
-    fn collect(&self, image: &Gray, found: &Found, mut rejects: Vec<Reject>) -> Observation {
+    fn collect(
+        &self,
+        scales: &mut Scales<'_>,
+        found: &Found,
+        mut rejects: Vec<Reject>,
+    ) -> Observation {
         let board = &self.board;
         let (columns, rows) = (board.squares_x as i32 - 1, board.squares_y as i32 - 1);
         let placement = &found.placement;
         let mut known: Vec<([f64; 2], Pixel)> = Vec::new();
-        for (node, (_, pixel)) in found.lattice.nodes.iter().zip(&found.nodes) {
+        for node in &found.lattice.nodes {
             let [x, y] = placement.corner(node.i, node.j);
             if (0..columns).contains(&x) && (0..rows).contains(&y) {
-                known.push(([f64::from(x), f64::from(y)], *pixel));
+                known.push(([f64::from(x), f64::from(y)], node.pixel));
             } else {
-                rejects.push(Reject { pixel: *pixel, reason: Reason::OffBoard });
+                rejects.push(Reject { pixel: node.pixel, reason: Reason::OffBoard });
             }
         }
-        let noise = noise_sigma(image);
-        let rim = (1.0 - board.marker_m / board.square_m) / 2.0;
+        let contrast = found.lattice.contrast;
         // First with what the lattice knew, then with what that found: corners far from the lattice come into reach.
         let mut corners: Vec<Corner> = Vec::new();
         for pass in 0..3 {
@@ -133,10 +158,10 @@ impl Detector {
                 let (Some(predicted), Some(axes)) = (map.at(x, y), map.axes(x, y)) else {
                     continue;
                 };
-                if !inside(image, predicted) {
+                if !inside(scales.image(), predicted) {
                     continue;
                 }
-                match self.corner(image, predicted, axes, rim, noise) {
+                match self.corner(scales, predicted, axes, contrast) {
                     Ok((pixel, sigma_px)) => corners.push(Corner { id, pixel, sigma_px }),
                     Err(reason) => failed.push(Reject { pixel: predicted, reason }),
                 }
@@ -170,20 +195,20 @@ impl Detector {
     /// One corner near its prediction.
     fn corner(
         &self,
-        image: &Gray,
+        scales: &mut Scales<'_>,
         predicted: Pixel,
         axes: [[f64; 2]; 2],
-        rim: f64,
-        noise: f64,
+        contrast: f64,
     ) -> Result<(Pixel, f64), Reason> {
+        let rim = (1.0 - self.board.marker_m / self.board.square_m) / 2.0;
         let spacing = axes[0][0].hypot(axes[0][1]).min(axes[1][0].hypot(axes[1][1]));
         let reach = (0.2 * spacing).clamp(1.5, 6.0);
-        let guess = Guess { pixel: predicted, axes, rim, noise };
-        let refined = refine(image, &guess, reach).ok_or(Reason::NoCrossing)?;
+        let guess = Guess { pixel: predicted, axes, rim, contrast };
+        let refined = refine(scales, &guess, reach).ok_or(Reason::NoCrossing)?;
         if refined.sigma_px > MAX_SIGMA_PX {
             return Err(Reason::Uncertain);
         }
-        if !is_crossing(image, refined.pixel, axes, rim) {
+        if !is_crossing(scales.image(), refined.pixel, axes, rim) {
             return Err(Reason::NoCrossing);
         }
         Ok((refined.pixel, refined.sigma_px))
@@ -225,15 +250,13 @@ impl Detector {
 struct Found {
     lattice: Lattice,
     placement: Placement,
-    /// Where its nodes lie.
-    nodes: Vec<([f64; 2], Pixel)>,
 }
 
 /// Blocks to try, best guess first: squares of 12 to 150 pixels are seen at half resolution, smaller ones at full,
 /// larger ones on a coarser level.
 fn factors(image: &Gray) -> Vec<usize> {
     let size = image.width().min(image.height());
-    let mut factors = vec![2, 1];
+    let mut factors = vec![2, 1, 3];
     let mut factor = 4;
     while size / factor >= COARSEST {
         factors.push(factor);

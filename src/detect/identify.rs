@@ -10,6 +10,18 @@
 //! ```
 //!
 //! with g and σ estimated under the best placement, and the sum divided by the number of bits that blur makes one.
+//!
+//! Where motion smears the bits over their neighbours that is not enough. Then the picture is explained as the
+//! expected pattern under an *unknown* blur: one kernel of 7 × 7 bits, the same for all cells, fitted by least squares
+//! for each placement in question. The placement that leaves the least residual wins by
+//!
+//! ```text
+//! log p(v | A) − log p(v | B) = N/2·(ln RSS_B − ln RSS_A),
+//! ```
+//!
+//! N being the number of independent samples. It is blind deconvolution with a finite list of candidate images.
+
+use std::sync::OnceLock;
 
 use crate::{
     board::{CharucoBoard, Layout},
@@ -70,27 +82,12 @@ struct Cell {
     j: i32,
     /// True for black on white, false for the inverse.
     bright: bool,
-    /// Soft bits in the lattice's own orientation: [along j][along i].
-    bits: Vec<f32>,
-}
-
-/// Lays the lattice onto the board; `Err` tells the best placement's numbers where none is certain.
-pub(super) fn identify(
-    board: &CharucoBoard,
-    image: &Gray,
-    lattice: &Lattice,
-    map: &SmoothMap,
-    contrast: f64,
-) -> Result<Placement, NotIdentified> {
-    let bright = cells(board, image, lattice, map, contrast, true);
-    // Prints with black and white exchanged are rare: look for them only where the usual reading fails.
-    match best_placement(board, lattice, &bright) {
-        Ok(placement) => Ok(placement),
-        Err(first) => {
-            let dark = cells(board, image, lattice, map, contrast, false);
-            best_placement(board, lattice, &dark).map_err(|_| first)
-        }
-    }
+    /// Grey values of the marker with its border, in the lattice's own orientation: [along j][along i].
+    samples: Vec<f32>,
+    /// Mean grey of the square's rim.
+    rim: f32,
+    /// Mean grey of the marker's border.
+    border: f32,
 }
 
 /// Why no placement was accepted.
@@ -108,13 +105,8 @@ fn cells(
     image: &Gray,
     lattice: &Lattice,
     map: &SmoothMap,
-    contrast: f64,
     bright: bool,
 ) -> Vec<Cell> {
-    let n = board.dictionary.bits();
-    let side = board.marker_m / board.square_m;
-    let cell_side = side / (n + 2) as f64;
-    let start = (1.0 - side) / 2.0;
     let mut candidates = std::collections::BTreeSet::new();
     for node in &lattice.nodes {
         for (di, dj) in [(-1, -1), (0, -1), (-1, 0), (0, 0)] {
@@ -139,138 +131,59 @@ fn cells(
                 top[1] + (bottom[1] - top[1]) * v,
             ))
         };
-        if let Some(bits) =
-            sample_cell(n, start, cell_side, at, if bright { 1.0 } else { -1.0 }, contrast)
-        {
-            cells.push(Cell { i, j, bright, bits });
+        if let Some((samples, rim, border)) = sample_cell(board, at) {
+            let step = if bright { rim - border } else { border - rim };
+            if step > MIN_CELL_CONTRAST * lattice.contrast {
+                cells.push(Cell { i, j, bright, samples, rim: rim as f32, border: border as f32 });
+            }
         }
     }
     cells
 }
 
-/// Soft bits of one cell; `None` where it leaves the image or shows no marker.
+/// Grey values at the centres of a marker's bits, border included, and the means of the square's rim and of the
+/// border; `None` where any of it leaves the image.
 fn sample_cell(
-    n: usize,
-    start: f64,
-    cell_side: f64,
+    board: &CharucoBoard,
     at: impl Fn(f64, f64) -> Option<f64>,
-    sign: f64,
-    contrast: f64,
-) -> Option<Vec<f32>> {
-    let center = |k: usize| start + (k as f64 + 0.5) * cell_side;
-    // The black border of the marker and the rim of the square round it.
-    let (mut border, mut rim) = (0.0, 0.0);
-    let outer = n + 1;
-    for k in 0..=n {
-        border += at(center(k), center(0))?;
-        border += at(center(outer), center(k))?;
-        border += at(center(outer - k), center(outer))?;
-        border += at(center(0), center(outer - k))?;
-    }
-    border /= (4 * (n + 1)) as f64;
+) -> Option<(Vec<f32>, f64, f64)> {
+    let size = board.dictionary.bits() + 2;
+    let side = board.marker_m / board.square_m;
+    let start = (1.0 - side) / 2.0;
+    let center = |k: usize| start + (k as f64 + 0.5) * side / size as f64;
+    let mut rim = 0.0;
     for t in [0.3, 0.5, 0.7] {
         for (u, v) in
             [(t, 0.5 * start), (t, 1.0 - 0.5 * start), (0.5 * start, t), (1.0 - 0.5 * start, t)]
         {
-            rim += at(u, v)?;
+            rim += at(u, v)? / 12.0;
         }
     }
-    rim /= 12.0;
-    let step = sign * (rim - border);
-    if step < MIN_CELL_CONTRAST * contrast {
-        return None;
-    }
-    let (middle, half) = (f64::midpoint(rim, border), (rim - border) / 2.0);
-    let mut bits = Vec::with_capacity(n * n);
-    for row in 1..=n {
-        for column in 1..=n {
-            let v = (at(center(column), center(row))? - middle) / half;
-            bits.push(v.clamp(-1.5, 1.5) as f32);
-        }
-    }
-    Some(bits)
-}
-
-fn best_placement(
-    board: &CharucoBoard,
-    lattice: &Lattice,
-    cells: &[Cell],
-) -> Result<Placement, NotIdentified> {
-    if cells.is_empty() {
-        return Err(NotIdentified::NoMarkers);
-    }
-    let n = board.dictionary.bits();
-    let n2 = n * n;
-    let expected = Expected::new(board);
-    // (score, bits, placement) of the best and the runner-up's score.
-    let mut best: Option<(f64, usize, Placement)> = None;
-    let mut second = f64::NEG_INFINITY;
-    for (index, &turn) in TURNS.iter().enumerate() {
-        // Where each board bit lies among a cell's samples, and the cells' bits in that order.
-        let order = bit_order(n, turn);
-        let turned: Vec<f32> =
-            cells.iter().flat_map(|cell| order.iter().map(|&k| cell.bits[k])).collect();
-        for shift in shifts(board, lattice, turn) {
-            let place = Placement {
-                turn,
-                shift,
-                layout: Layout::New,
-                mirrored: index >= 4,
-                inverted: !cells[0].bright,
-                n_markers: 0,
-                margin: 0.0,
-                significance: 0.0,
-            };
-            for layout in expected.layouts() {
-                let Some((score, n_markers)) = expected.score(*layout, &place, cells, &turned, n2)
-                else {
-                    continue;
-                };
-                if best.as_ref().is_none_or(|(s, ..)| score > *s) {
-                    if let Some((s, ..)) = best {
-                        second = second.max(s);
-                    }
-                    best = Some((
-                        score,
-                        n_markers * n2,
-                        Placement { layout: *layout, n_markers, ..place },
-                    ));
-                } else {
-                    second = second.max(score);
-                }
+    let (mut samples, mut border) = (Vec::with_capacity(size * size), 0.0);
+    for row in 0..size {
+        for column in 0..size {
+            let value = at(center(column), center(row))?;
+            if row == 0 || column == 0 || row == size - 1 || column == size - 1 {
+                border += value / (4 * (size - 1)) as f64;
             }
+            samples.push(value as f32);
         }
     }
-    let (score, n_bits, mut placement) = best.ok_or(NotIdentified::Ambiguous)?;
-    let energy: f64 = cells.iter().flat_map(|c| &c.bits).map(|v| f64::from(v * v)).sum::<f64>()
-        / (cells.len() * n2) as f64;
-    let gain = score / n_bits.max(1) as f64;
-    // The floor keeps a perfect picture from claiming certainty beyond its few bits.
-    let variance = (energy - gain * gain).max(0.1);
-    placement.significance =
-        gain / energy.sqrt().max(1e-6) * (n_bits as f64 / BITS_PER_VOTE).sqrt();
-    placement.margin = gain / variance * (score - second.max(0.0)) / BITS_PER_VOTE;
-    if placement.n_markers >= 2
-        && placement.margin > MIN_MARGIN
-        && placement.significance > MIN_SIGNIFICANCE
-    {
-        Ok(placement)
-    } else {
-        Err(NotIdentified::Ambiguous)
-    }
+    Some((samples, rim, border))
 }
 
-/// For every bit of a marker on the board (row by row) the index of its sample in a cell of the lattice.
-fn bit_order(n: usize, turn: [[i32; 2]; 2]) -> Vec<usize> {
-    let last = n as i32 - 1;
-    let mut order = Vec::with_capacity(n * n);
-    for row in 0..n as i32 {
-        for column in 0..n as i32 {
+/// For every sample of a marker on the board (row by row, border included) the index of its sample in a cell of the
+/// lattice.
+fn sample_order(size: usize, turn: [[i32; 2]; 2]) -> Vec<usize> {
+    let last = size as i32 - 1;
+    let mut order = Vec::with_capacity(size * size);
+    for row in 0..size as i32 {
+        for column in 0..size as i32 {
             // Twice the offset from the cell's centre, turned back into the lattice (the inverse is the transpose).
             let (dx, dy) = (2 * column - last, 2 * row - last);
             let i = turn[0][0] * dx + turn[1][0] * dy;
             let j = turn[0][1] * dx + turn[1][1] * dy;
-            order.push((((j + last) / 2) * n as i32 + (i + last) / 2) as usize);
+            order.push((((j + last) / 2) * size as i32 + (i + last) / 2) as usize);
         }
     }
     order
@@ -312,25 +225,39 @@ fn shifts(board: &CharucoBoard, lattice: &Lattice, turn: [[i32; 2]; 2]) -> Vec<[
     shifts
 }
 
-/// What the board's squares show, ready for correlation.
-struct Expected<'a> {
-    board: &'a CharucoBoard,
+/// What the board's squares show, ready for comparison.
+#[derive(Clone, Debug)]
+pub(super) struct Expected {
+    board: CharucoBoard,
     layouts: &'static [Layout],
     /// For each layout the marker of each square, or none.
     markers: Vec<Vec<Option<usize>>>,
-    /// ±1 for every bit of every marker used.
+    /// ±1 for every sample of every marker used, border included.
     codes: Vec<f32>,
+    n_used: usize,
+    /// Samples along one side of a marker, border included.
+    size: usize,
+    /// Made when the first blurred picture needs it.
+    blur: OnceLock<BlurModel>,
 }
 
-impl<'a> Expected<'a> {
-    fn new(board: &'a CharucoBoard) -> Self {
+/// A placement and the index of its turn.
+#[derive(Clone, Copy)]
+struct Candidate {
+    score: f64,
+    turn: usize,
+    place: Placement,
+}
+
+impl Expected {
+    pub(super) fn new(board: &CharucoBoard) -> Self {
         // With an odd number of rows the layouts are the same.
         let layouts: &[Layout] = if board.squares_y.is_multiple_of(2) {
             &[Layout::New, Layout::Legacy]
         } else {
             &[Layout::New]
         };
-        let n = board.dictionary.bits();
+        let size = board.dictionary.bits() + 2;
         let mut n_used = 0;
         let markers = layouts
             .iter()
@@ -343,50 +270,296 @@ impl<'a> Expected<'a> {
                 squares
             })
             .collect();
-        let mut codes = Vec::with_capacity(n_used * n * n);
+        let mut codes = Vec::with_capacity(n_used * size * size);
         for id in 0..n_used {
-            for row in 1..=n {
-                for column in 1..=n {
+            for row in 0..size {
+                for column in 0..size {
                     codes.push(if board.dictionary.is_white(id, row, column) { 1.0 } else { -1.0 });
                 }
             }
         }
-        Self { board, layouts, markers, codes }
+        Self { board: board.clone(), layouts, markers, codes, n_used, size, blur: OnceLock::new() }
     }
 
-    fn layouts(&self) -> &[Layout] {
-        self.layouts
-    }
-
-    /// Σ v·c over all cells that lie on the board, and how many they are; `None` where the colours of the squares
-    /// contradict the placement.
-    fn score(
+    /// Lays the lattice onto the board by the soft bits of its cells: quick, and enough unless motion smears them.
+    pub(super) fn by_bits(
         &self,
-        layout: Layout,
-        place: &Placement,
-        cells: &[Cell],
-        turned: &[f32],
-        n2: usize,
-    ) -> Option<(f64, usize)> {
-        let squares = &self.markers[self.layouts.iter().position(|l| *l == layout)?];
-        let (mut score, mut n_markers) = (0.0_f32, 0);
-        for (index, cell) in cells.iter().enumerate() {
-            // The square between the corners (i, j) and (i + 1, j + 1): its column is the larger of its corners'.
-            let [a, b] = [place.corner(cell.i, cell.j), place.corner(cell.i + 1, cell.j + 1)];
-            let (column, row) = (a[0].max(b[0]), a[1].max(b[1]));
-            if column < 0
-                || row < 0
-                || column >= self.board.squares_x as i32
-                || row >= self.board.squares_y as i32
-            {
+        image: &Gray,
+        lattice: &Lattice,
+        map: &SmoothMap,
+    ) -> Result<Placement, NotIdentified> {
+        self.best_by_bits(lattice, &cells(&self.board, image, lattice, map, true))
+    }
+
+    /// Lays the lattice onto the board where [`by_bits`](Self::by_bits) failed: under an unknown blur, then as a
+    /// print with black and white exchanged.
+    pub(super) fn by_effort(
+        &self,
+        image: &Gray,
+        lattice: &Lattice,
+        map: &SmoothMap,
+    ) -> Result<Placement, NotIdentified> {
+        let bright = cells(&self.board, image, lattice, map, true);
+        let dark = || cells(&self.board, image, lattice, map, false);
+        self.best_by_bits(lattice, &bright).or_else(|why| {
+            self.best_by_blur(lattice, &bright)
+                .or_else(|_| self.best_by_bits(lattice, &dark()))
+                .map_err(|_| why)
+        })
+    }
+
+    /// The marker that a placement expects in a cell: `Some(None)` beyond the board, `None` where the square there
+    /// has the other colour.
+    fn marker(&self, place: &Placement, cell: &Cell) -> Option<Option<usize>> {
+        // The square between the corners (i, j) and (i + 1, j + 1): its column is the larger of its corners'.
+        let [a, b] = [place.corner(cell.i, cell.j), place.corner(cell.i + 1, cell.j + 1)];
+        let (column, row) = (a[0].max(b[0]), a[1].max(b[1]));
+        let (columns, rows) = (self.board.squares_x as i32, self.board.squares_y as i32);
+        if !((0..columns).contains(&column) && (0..rows).contains(&row)) {
+            return Some(None);
+        }
+        let squares = &self.markers[self.layouts.iter().position(|l| *l == place.layout)?];
+        squares[(row * columns + column) as usize].map(Some)
+    }
+
+    /// Every placement that the colours of the squares allow, with the number of its markers.
+    fn placements(&self, lattice: &Lattice, cells: &[Cell]) -> Vec<Candidate> {
+        let mut all = Vec::new();
+        for (turn, &matrix) in TURNS.iter().enumerate() {
+            for shift in shifts(&self.board, lattice, matrix) {
+                for &layout in self.layouts {
+                    let mut place = Placement {
+                        turn: matrix,
+                        shift,
+                        layout,
+                        mirrored: turn >= 4,
+                        inverted: !cells[0].bright,
+                        n_markers: 0,
+                        margin: 0.0,
+                        significance: 0.0,
+                    };
+                    // All cells have one colour and the board alternates: the first that lies on it decides.
+                    let fits = cells.iter().find_map(|cell| match self.marker(&place, cell) {
+                        Some(None) => None,
+                        Some(Some(_)) => Some(true),
+                        None => Some(false),
+                    });
+                    if fits == Some(true) {
+                        place.n_markers = cells
+                            .iter()
+                            .filter(|c| matches!(self.marker(&place, c), Some(Some(_))))
+                            .count();
+                        all.push(Candidate { score: 0.0, turn, place });
+                    }
+                }
+            }
+        }
+        all
+    }
+
+    /// The cells' values in the orientation of the board, for each turn.
+    fn turned(&self, cells: &[Cell], value: impl Fn(&Cell, usize) -> f32) -> Vec<Vec<f32>> {
+        TURNS
+            .iter()
+            .map(|&turn| {
+                let order = sample_order(self.size, turn);
+                cells.iter().flat_map(|cell| order.iter().map(|&k| value(cell, k))).collect()
+            })
+            .collect()
+    }
+
+    /// The placement whose markers the soft bits agree with.
+    fn best_by_bits(&self, lattice: &Lattice, cells: &[Cell]) -> Result<Placement, NotIdentified> {
+        if cells.is_empty() {
+            return Err(NotIdentified::NoMarkers);
+        }
+        let (size, n2) = (self.size, self.size * self.size);
+        // The border is the same for all markers: it sets the scale and has no vote.
+        let is_bit =
+            |k: usize| (1..size - 1).contains(&(k / size)) && (1..size - 1).contains(&(k % size));
+        let values = self.turned(cells, |cell, k| {
+            if !is_bit(k) {
+                return 0.0;
+            }
+            let (middle, half) = ((cell.rim + cell.border) / 2.0, (cell.rim - cell.border) / 2.0);
+            ((cell.samples[k] - middle) / half).clamp(-1.5, 1.5)
+        });
+        let mut candidates = self.placements(lattice, cells);
+        for candidate in &mut candidates {
+            let mut score = 0.0_f32;
+            for (cell, bits) in cells.iter().zip(values[candidate.turn].chunks_exact(n2)) {
+                if let Some(Some(id)) = self.marker(&candidate.place, cell) {
+                    score += bits
+                        .iter()
+                        .zip(&self.codes[id * n2..][..n2])
+                        .map(|(v, c)| v * c)
+                        .sum::<f32>();
+                }
+            }
+            candidate.score = f64::from(score);
+        }
+        let (best, second) = best_two(&candidates).ok_or(NotIdentified::Ambiguous)?;
+        let n_bits = (best.place.n_markers * (size - 2) * (size - 2)) as f64;
+        let energy = values[0].iter().map(|v| f64::from(v * v)).sum::<f64>()
+            / (cells.len() * (size - 2) * (size - 2)) as f64;
+        let gain = best.score / n_bits.max(1.0);
+        // The floor keeps a perfect picture from claiming certainty beyond its few bits.
+        let variance = (energy - gain * gain).max(0.1);
+        let significance = gain / energy.sqrt().max(1e-6) * (n_bits / BITS_PER_VOTE).sqrt();
+        let margin = gain / variance * (best.score - second.max(0.0)) / BITS_PER_VOTE;
+        accept(Placement { margin, significance, ..best.place })
+    }
+
+    /// The placement that, under a blur of its own, leaves the least of the picture unexplained.
+    fn best_by_blur(&self, lattice: &Lattice, cells: &[Cell]) -> Result<Placement, NotIdentified> {
+        if cells.len() < 4 {
+            return Err(NotIdentified::Ambiguous); // Too few samples for a kernel.
+        }
+        let n2 = self.size * self.size;
+        let half = lattice.contrast as f32 / 2.0;
+        let values = self.turned(cells, |cell, k| (cell.samples[k] - cell.rim) / half + 1.0);
+        let blur = self.blur.get_or_init(|| BlurModel::new(self));
+        let mut candidates = self.placements(lattice, cells);
+        // Every pair of a cell and a marker is met by many placements: correlate it once.
+        let mut memo: Vec<Option<Box<[f64; TAPS]>>> =
+            vec![None; TURNS.len() * cells.len() * self.n_used];
+        let most = candidates.iter().map(|c| c.place.n_markers).max().unwrap_or(0);
+        let mut n_samples = 0.0;
+        for candidate in &mut candidates {
+            // Residuals are comparable only over the same cells.
+            if candidate.place.n_markers < most {
+                candidate.score = f64::NEG_INFINITY;
                 continue;
             }
-            let id = squares[row as usize * self.board.squares_x + column as usize]?;
-            let bits = &turned[index * n2..][..n2];
-            let code = &self.codes[id * n2..][..n2];
-            score += bits.iter().zip(code).map(|(v, c)| v * c).sum::<f32>();
-            n_markers += 1;
+            let mut normal = nalgebra::SMatrix::<f64, TAPS, TAPS>::zeros();
+            let mut right = nalgebra::SVector::<f64, TAPS>::zeros();
+            let mut energy = 0.0;
+            n_samples = 0.0;
+            for (c, cell) in cells.iter().enumerate() {
+                let Some(Some(id)) = self.marker(&candidate.place, cell) else { continue };
+                let samples = &values[candidate.turn][c * n2..][..n2];
+                normal += &blur.normals[id];
+                let key = (candidate.turn * cells.len() + c) * self.n_used + id;
+                let part = memo[key].get_or_insert_with(|| Box::new(blur.correlate(id, samples)));
+                for (r, p) in right.iter_mut().zip(part.iter()) {
+                    *r += p;
+                }
+                energy += samples.iter().map(|v| f64::from(v * v)).sum::<f64>();
+                n_samples += n2 as f64;
+            }
+            for t in 0..TAPS {
+                normal[(t, t)] += 1e-3 * n_samples;
+            }
+            let Some(cholesky) = normal.cholesky() else { continue };
+            let kernel = cholesky.solve(&right);
+            let residual = (energy - kernel.dot(&right)).max(1e-6 * energy);
+            candidate.score = -(residual / n_samples).ln();
         }
-        Some((f64::from(score), n_markers))
+        let (best, second) = best_two(&candidates).ok_or(NotIdentified::Ambiguous)?;
+        let votes = n_samples / (2.0 * SAMPLES_PER_VOTE);
+        let margin = votes * (best.score - second);
+        // Against chance: all other placements are samples of it.
+        let others: Vec<f64> = candidates
+            .iter()
+            .map(|c| c.score)
+            .filter(|s| s.is_finite() && *s < best.score)
+            .collect();
+        let mean = others.iter().sum::<f64>() / others.len().max(1) as f64;
+        let spread = (others.iter().map(|s| (s - mean).powi(2)).sum::<f64>()
+            / others.len().max(1) as f64)
+            .sqrt();
+        let significance =
+            if others.len() < 8 { 0.0 } else { (best.score - mean) / spread.max(1e-9) };
+        accept(Placement { margin, significance, ..best.place })
+    }
+}
+
+/// The best candidate and the score of the runner-up.
+fn best_two(candidates: &[Candidate]) -> Option<(Candidate, f64)> {
+    let mut best: Option<&Candidate> = None;
+    let mut second = f64::NEG_INFINITY;
+    for candidate in candidates {
+        match best {
+            Some(b) if candidate.score <= b.score => second = second.max(candidate.score),
+            _ => {
+                second = best.map_or(second, |b| second.max(b.score));
+                best = Some(candidate);
+            }
+        }
+    }
+    best.map(|b| (*b, second))
+}
+
+fn accept(placement: Placement) -> Result<Placement, NotIdentified> {
+    if placement.n_markers >= 2
+        && placement.margin > MIN_MARGIN
+        && placement.significance > MIN_SIGNIFICANCE
+    {
+        Ok(placement)
+    } else {
+        Err(NotIdentified::Ambiguous)
+    }
+}
+
+/// Reach of the blur's kernel, bits to each side.
+const REACH: i32 = 3;
+/// Unknowns of the blur: its kernel and a constant.
+const TAPS: usize = 50;
+/// Blurred samples are far from independent: this many count as one.
+const SAMPLES_PER_VOTE: f64 = 4.0;
+
+/// The expected markers, shifted by every tap of the kernel.
+#[derive(Clone, Debug)]
+struct BlurModel {
+    /// For each marker, sample and tap: the expected value.
+    shifted: Vec<f32>,
+    /// For each marker the normal matrix of its samples.
+    normals: Vec<nalgebra::SMatrix<f64, TAPS, TAPS>>,
+    n2: usize,
+}
+
+impl BlurModel {
+    fn new(expected: &Expected) -> Self {
+        let (size, n2) = (expected.size as i32, expected.size * expected.size);
+        let mut shifted = Vec::with_capacity(expected.n_used * n2 * TAPS);
+        let mut normals = Vec::with_capacity(expected.n_used);
+        for id in 0..expected.n_used {
+            let mut normal = nalgebra::SMatrix::<f64, TAPS, TAPS>::zeros();
+            for row in 0..size {
+                for column in 0..size {
+                    let mut taps = [1.0_f32; TAPS];
+                    let offsets =
+                        (-REACH..=REACH).flat_map(|dy| (-REACH..=REACH).map(move |dx| (dx, dy)));
+                    for (tap, (dx, dy)) in taps.iter_mut().zip(offsets) {
+                        let (r, c) = (row + dy, column + dx);
+                        // Round the marker lies the white rim of its square.
+                        *tap = if (0..size).contains(&r) && (0..size).contains(&c) {
+                            expected.codes[id * n2 + (r * size + c) as usize]
+                        } else {
+                            1.0
+                        };
+                    }
+                    let v = nalgebra::SVector::<f64, TAPS>::from_iterator(
+                        taps.iter().map(|&t| f64::from(t)),
+                    );
+                    normal.ger(1.0, &v, &v, 1.0);
+                    shifted.extend(taps);
+                }
+            }
+            normals.push(normal);
+        }
+        Self { shifted, normals, n2 }
+    }
+
+    /// Σ over the samples of value · expected, for each tap.
+    fn correlate(&self, id: usize, samples: &[f32]) -> [f64; TAPS] {
+        let mut sums = [0.0_f32; TAPS];
+        let rows = self.shifted[id * self.n2 * TAPS..][..self.n2 * TAPS].chunks_exact(TAPS);
+        for (v, row) in samples.iter().zip(rows) {
+            for (sum, t) in sums.iter_mut().zip(row) {
+                *sum += v * t;
+            }
+        }
+        sums.map(f64::from)
     }
 }

@@ -5,30 +5,80 @@
 //! way. Links that both ends agree on are followed from saddle to saddle, which numbers them (i, j) without any model
 //! of the camera: perspective and lens distortion only bend the lattice, they do not change who is whose neighbour.
 
-use super::{pyramid::Level, saddle::Saddle};
+use std::collections::{BTreeSet, VecDeque};
 
-/// Saddles numbered along two axes. In the image, the axis j lies clockwise of i, as y lies of x.
+use crate::geom::Pixel;
+
+use super::{map::SmoothMap, pyramid::Level, saddle::Saddle};
+
+/// Corners numbered along two axes. In the image, the axis j lies clockwise of i, as y lies of x.
 #[derive(Clone, Debug)]
 pub(super) struct Lattice {
     /// The nodes, by (j, i).
     pub(super) nodes: Vec<Node>,
+    /// Median contrast of the corners, grey levels.
+    pub(super) contrast: f64,
     /// True where the cell between (0, 0) and (1, 1) is bright; cells alternate from there.
     pub(super) origin_is_bright: bool,
 }
 
-/// A saddle and its number.
+/// A corner and its number.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Node {
     pub(super) i: i32,
     pub(super) j: i32,
-    /// Index of the saddle.
-    pub(super) saddle: usize,
+    /// Where it lies in the image.
+    pub(super) pixel: Pixel,
 }
 
 impl Lattice {
     /// True where the cell between (i, j) and (i + 1, j + 1) is bright.
     pub(super) fn is_bright(&self, i: i32, j: i32) -> bool {
         self.origin_is_bright == ((i + j) % 2 == 0)
+    }
+
+    /// The map from (i, j) to the image; `None` where the nodes do not span a plane.
+    pub(super) fn map(&self) -> Option<SmoothMap> {
+        let nodes: Vec<([f64; 2], Pixel)> =
+            self.nodes.iter().map(|n| ([f64::from(n.i), f64::from(n.j)], n.pixel)).collect();
+        SmoothMap::fit(&nodes)
+    }
+
+    /// Where it is, for people: one of its middle nodes.
+    pub(super) fn middle(&self) -> Pixel {
+        self.nodes[self.nodes.len() / 2].pixel
+    }
+
+    /// Adds the neighbours of nodes that `find` sees at the place where the map expects them, until it sees no more.
+    /// At most `most` nodes.
+    pub(super) fn extend(
+        &mut self,
+        most: usize,
+        mut find: impl FnMut(&SmoothMap, i32, i32) -> Option<Pixel>,
+    ) {
+        let mut known: BTreeSet<(i32, i32)> = self.nodes.iter().map(|n| (n.j, n.i)).collect();
+        let mut tried = known.clone();
+        while let Some(map) = self.map() {
+            let around: BTreeSet<(i32, i32)> = known
+                .iter()
+                .flat_map(|&(j, i)| [(j, i + 1), (j, i - 1), (j + 1, i), (j - 1, i)])
+                .filter(|place| !tried.contains(place))
+                .collect();
+            let n_before = self.nodes.len();
+            for &(j, i) in &around {
+                if self.nodes.len() < most
+                    && let Some(pixel) = find(&map, i, j)
+                {
+                    self.nodes.push(Node { i, j, pixel });
+                    known.insert((j, i));
+                }
+            }
+            tried.extend(around);
+            if self.nodes.len() == n_before {
+                break;
+            }
+        }
+        self.nodes.sort_unstable_by_key(|n| (n.j, n.i));
     }
 }
 
@@ -49,7 +99,7 @@ pub(super) fn lattices(level: &Level, saddles: &[Saddle], min_nodes: usize) -> V
     // Saddles come strongest first: numbering starts where the image is clearest.
     for root in 0..saddles.len() {
         if !taken[root] {
-            let lattice = grow(saddles, &links, root, &mut taken);
+            let lattice = grow(level, saddles, &links, root, &mut taken);
             if lattice.nodes.len() >= min_nodes {
                 found.push(lattice);
             }
@@ -142,16 +192,24 @@ fn is_edge(level: &Level, a: &Saddle, b: &Saddle, bright_clockwise: bool) -> boo
 }
 
 /// Numbers everything that can be reached from `root`.
-fn grow(saddles: &[Saddle], links: &[[Link; 4]], root: usize, taken: &mut [bool]) -> Lattice {
+fn grow(
+    level: &Level,
+    saddles: &[Saddle],
+    links: &[[Link; 4]],
+    root: usize,
+    taken: &mut [bool],
+) -> Lattice {
     // For each saddle reached: its number, and which of its edges points along +i.
-    let mut queue = std::collections::VecDeque::from([(root, 0_i32, 0_i32, 0_usize)]);
+    let mut queue = VecDeque::from([(root, 0_i32, 0_i32, 0_usize)]);
     let mut nodes: Vec<Node> = Vec::new();
-    let mut occupied = std::collections::BTreeSet::from([(0, 0)]);
+    let mut contrasts: Vec<f32> = Vec::new();
+    let mut occupied = BTreeSet::from([(0, 0)]);
     taken[root] = true;
     let step = |axis: usize| [(1, 0), (0, 1), (-1, 0), (0, -1)][axis];
     let mut bright_votes = 0_i32;
     while let Some((p, i, j, first)) = queue.pop_front() {
-        nodes.push(Node { i, j, saddle: p });
+        nodes.push(Node { i, j, pixel: level.to_image(saddles[p].x, saddles[p].y) });
+        contrasts.push(saddles[p].contrast);
         // The sector from +i to +j is the cell (i, j).
         let bright = saddles[p].is_bright_after(first) == ((i + j) % 2 == 0);
         bright_votes += if bright { 1 } else { -1 };
@@ -172,7 +230,9 @@ fn grow(saddles: &[Saddle], links: &[[Link; 4]], root: usize, taken: &mut [bool]
         }
     }
     nodes.sort_unstable_by_key(|n| (n.j, n.i));
-    Lattice { nodes, origin_is_bright: bright_votes > 0 }
+    contrasts.sort_unstable_by(f32::total_cmp);
+    let contrast = f64::from(contrasts[contrasts.len() / 2]);
+    Lattice { nodes, contrast, origin_is_bright: bright_votes > 0 }
 }
 
 /// Saddles by place.

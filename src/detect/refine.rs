@@ -16,6 +16,8 @@
 
 use crate::{geom::Pixel, image::Gray};
 
+use super::pyramid::Level;
+
 /// A corner to refine.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Guess {
@@ -25,8 +27,43 @@ pub(super) struct Guess {
     pub(super) axes: [[f64; 2]; 2],
     /// Width of the white rim round a marker, in squares.
     pub(super) rim: f64,
+    /// White minus black on the board, grey levels.
+    pub(super) contrast: f64,
+}
+
+/// An image and, made when first needed, smaller versions of it on which strongly blurred corners are measured.
+#[derive(Debug)]
+pub(super) struct Scales<'a> {
+    image: &'a Gray,
     /// Standard deviation of the image's noise, grey levels.
-    pub(super) noise: f64,
+    noise: f64,
+    coarse: [Option<Gray>; MAX_FACTOR - 1],
+}
+
+impl<'a> Scales<'a> {
+    pub(super) fn new(image: &'a Gray) -> Self {
+        Self { image, noise: noise_sigma(image), coarse: [const { None }; MAX_FACTOR - 1] }
+    }
+
+    /// The image itself.
+    pub(super) fn image(&self) -> &'a Gray {
+        self.image
+    }
+
+    /// The image in blocks of `factor` × `factor` pixels, smoothed, and its noise.
+    fn at(&mut self, factor: usize) -> Option<(&Gray, f64)> {
+        if factor == 1 {
+            return Some((self.image, self.noise));
+        }
+        let slot = &mut self.coarse[factor - 2];
+        if slot.is_none() {
+            let level = Level::new(self.image, factor)?;
+            let pixels = level.gray.iter().map(|v| (v + 0.5) as u8).collect();
+            *slot = Some(Gray::new(level.width, level.height, pixels));
+        }
+        // Averaging divides white noise; what smoothing leaves of it is 0.27 of a pixel's (Σw² = 70/256 per axis).
+        Some((slot.as_ref()?, (0.27 * self.noise / factor as f64).max(ROUNDING)))
+    }
 }
 
 /// A refined corner.
@@ -36,8 +73,12 @@ pub(super) struct Refined {
     pub(super) sigma_px: f64,
 }
 
-/// Longest reach along an edge, pixels: more adds cost, not accuracy that the printer has.
-const MAX_REACH: f64 = 8.0;
+/// Reach along a sharp edge, pixels: more adds cost, not accuracy that the printer has.
+const SHARP_REACH: f64 = 8.0;
+/// Widths of the blur that the sum takes in, to each side of an edge and along the other.
+const BLUR_WIDTHS: f64 = 1.25;
+/// Longest reach, pixels: bounds the cost.
+const MAX_REACH: f64 = 40.0;
 /// Reach along an edge, in squares: short of the neighbouring corner.
 const REACH: f64 = 0.42;
 /// The cross is never narrower than this, pixels: blurred edges are wider.
@@ -49,8 +90,54 @@ const MOST_STEPS: usize = 8;
 /// What calibration targets, lenses and demosaicing leave even in a noiseless picture, pixels.
 const FLOOR_PX: f64 = 0.01;
 
+/// Largest factor by which a blurred picture is reduced.
+const MAX_FACTOR: usize = 6;
+/// Blur that a reduced picture may keep, pixels. A blurred edge can be two: the hand rests at both ends of a shake.
+/// Reduced to this width they are one again, and the corner is the middle of the blur, as a person sees it.
+const KEPT_BLUR: f64 = 5.0;
+/// Uncertainty of where in a blur the corner is, as a fraction of the width beyond a sharp edge's.
+const BLUR_SIGMA: f64 = 0.03;
+/// Width of an edge that counts as sharp, pixels.
+const SHARP: f64 = 5.0;
+
 /// The corner near the guess; `None` where no crossing of two edges is within `reach_px` of it.
-pub(super) fn refine(image: &Gray, guess: &Guess, reach_px: f64) -> Option<Refined> {
+pub(super) fn refine(scales: &mut Scales<'_>, guess: &Guess, reach_px: f64) -> Option<Refined> {
+    let [u, v] = guess.axes;
+    let det = (u[0] * v[1] - u[1] * v[0]).abs();
+    let across = [det / u[0].hypot(u[1]), det / v[0].hypot(v[1])];
+    if !(across[0] > 1.5 && across[1] > 1.5) {
+        return None;
+    }
+    let blur = [
+        blur_width(scales.image, guess, u, v, across[0]),
+        blur_width(scales.image, guess, v, u, across[1]),
+    ];
+    let widest = blur[0].max(blur[1]);
+    let factor = ((widest / KEPT_BLUR) as usize).clamp(1, MAX_FACTOR);
+    let f = factor as f64;
+    let (image, noise) = scales.at(factor)?;
+    let offset = (f - 1.0) / 2.0;
+    let scaled = Guess {
+        pixel: Pixel::new((guess.pixel.x - offset) / f, (guess.pixel.y - offset) / f),
+        axes: guess.axes.map(|a| a.map(|c| c / f)),
+        ..*guess
+    };
+    let found = refine_at(image, noise, &scaled, blur.map(|b| b / f), reach_px / f)?;
+    let blur_sigma = BLUR_SIGMA * (widest - SHARP).max(0.0);
+    Some(Refined {
+        pixel: Pixel::new(found.pixel.x * f + offset, found.pixel.y * f + offset),
+        sigma_px: (found.sigma_px * f).hypot(FLOOR_PX).hypot(blur_sigma),
+    })
+}
+
+/// [`refine`] on one scale; `blur` is the width of the blur across the edges along both axes, pixels.
+fn refine_at(
+    image: &Gray,
+    noise: f64,
+    guess: &Guess,
+    blur: [f64; 2],
+    reach_px: f64,
+) -> Option<Refined> {
     let [u, v] = guess.axes;
     let det = u[0] * v[1] - u[1] * v[0];
     let (lu, lv) = (u[0].hypot(u[1]), v[0].hypot(v[1]));
@@ -61,15 +148,25 @@ pub(super) fn refine(image: &Gray, guess: &Guess, reach_px: f64) -> Option<Refin
     let inverse = [[v[1] / det, -v[0] / det], [-u[1] / det, u[0] / det]];
     // Distance between opposite edges of a square, in pixels, across each axis.
     let (across_u, across_v) = (det.abs() / lu, det.abs() / lv);
+    // Blur across the edge along u widens the sum across that edge, and what the other edge must reach beyond.
+    let [blur_u, blur_v] = blur.map(|b| BLUR_WIDTHS * b);
+    let along = |blur: f64, length: f64| {
+        ((SHARP_REACH + blur - 4.0).clamp(SHARP_REACH, MAX_REACH) / length).min(REACH)
+    };
+    let width = |blur: f64, across: f64| {
+        let rim = (0.9 * guess.rim).max(MIN_WIDTH / across);
+        rim.min(blur.max(SHARP_REACH) / across).min(REACH)
+    };
+    let (along_u, along_v) = (along(blur_v, lu), along(blur_u, lv));
+    let (width_u, width_v) = (width(blur_u, across_u), width(blur_v, across_v));
     let cross = Cross {
         inverse,
-        along: [1.0 / (MAX_REACH / lu).min(REACH), 1.0 / (MAX_REACH / lv).min(REACH)],
-        width: [
-            1.0 / (0.9 * guess.rim).max(MIN_WIDTH / across_v).min(REACH),
-            1.0 / (0.9 * guess.rim).max(MIN_WIDTH / across_u).min(REACH),
-        ],
+        along: [1.0 / along_u, 1.0 / along_v],
+        // Across the edge along u one moves along v.
+        width: [1.0 / width_v, 1.0 / width_u],
     };
-    let half = (MAX_REACH.min(REACH * lu.max(lv)) + 1.0).ceil() as i64;
+    let half =
+        (along_u.max(width_v) * lu).max(along_v.max(width_u) * lv).min(MAX_REACH).ceil() as i64 + 1;
     let mut q = [guess.pixel.x, guess.pixel.y];
     let mut window: Option<Window> = None;
     for step in 0..MOST_STEPS {
@@ -85,14 +182,49 @@ pub(super) fn refine(image: &Gray, guess: &Guess, reach_px: f64) -> Option<Refin
             return None;
         }
         if moved < CONVERGED || (step + 1 == MOST_STEPS && moved < 0.05) {
-            let sigma = window.sigma(&cross, q, guess.noise)?;
-            return Some(Refined {
-                pixel: Pixel::new(q[0], q[1]),
-                sigma_px: sigma.hypot(FLOOR_PX),
-            });
+            let sigma_px = window.sigma(&cross, q, noise)?;
+            return Some(Refined { pixel: Pixel::new(q[0], q[1]), sigma_px });
         }
     }
     None
+}
+
+/// Width of the blur across the edge along `edge`, pixels: how far it takes the grey values to go from 15 % to 85 % of
+/// the step, over 0.7, on the better of the edge's two halves. `across` is the distance that one of `other` spans at
+/// right angles to the edge. 0 where no edge is seen.
+fn blur_width(image: &Gray, guess: &Guess, edge: [f64; 2], other: [f64; 2], across: f64) -> f64 {
+    const STEPS: usize = 12;
+    const MOST_PX: f64 = 18.0;
+    let reach = guess.rim.max(1.5 / across).min(MOST_PX / across);
+    let step = 2.0 * reach / STEPS as f64;
+    let mut narrowest: Option<f64> = None;
+    for arm in [-0.3, 0.3] {
+        let mut profile = [0.0; STEPS + 1];
+        let seen = profile.iter_mut().enumerate().all(|(k, value)| {
+            let t = k as f64 * step - reach;
+            let at = Pixel::new(
+                guess.pixel.x + arm * edge[0] + t * other[0],
+                guess.pixel.y + arm * edge[1] + t * other[1],
+            );
+            image.bilinear(at).map(|v| *value = v).is_some()
+        });
+        let (from, to) = (profile[0], profile[STEPS]);
+        if !seen || (to - from).abs() < 0.3 * guess.contrast {
+            continue;
+        }
+        let fraction = |k: usize| (profile[k] - from) / (to - from);
+        let crossing = |level: f64| {
+            (0..STEPS).find(|&k| fraction(k + 1) >= level).map(|k| {
+                let (a, b) = (fraction(k), fraction(k + 1));
+                k as f64 + (level - a) / (b - a).max(1e-9)
+            })
+        };
+        if let (Some(low), Some(high)) = (crossing(0.15), crossing(0.85)) {
+            let width = (high - low) * step * across / 0.7;
+            narrowest = Some(narrowest.map_or(width, |n: f64| n.min(width)));
+        }
+    }
+    narrowest.unwrap_or(0.0)
 }
 
 /// The region of the edges through a corner, in board coordinates.
@@ -223,11 +355,13 @@ impl Window {
     }
 }
 
+/// What rounding to 8 bits adds, grey levels: √(1/12).
+const ROUNDING: f64 = 0.288_675;
+
 /// Standard deviation of the image's noise, grey levels: the median response to a kernel that cancels any smooth
-/// surface (Immerkær, CVIU 1996), so that edges and texture, being few, do not count. Never below what rounding to
-/// 8 bits leaves, √(1/12).
-pub(super) fn noise_sigma(image: &Gray) -> f64 {
-    const ROUNDING: f64 = 0.288_675;
+/// surface (Immerkær, CVIU 1996), so that edges and texture, being few, do not count. Never below
+/// [`ROUNDING`].
+fn noise_sigma(image: &Gray) -> f64 {
     let (width, height) = (image.width(), image.height());
     if width < 3 || height < 3 {
         return ROUNDING;
