@@ -40,6 +40,8 @@ mod metadata;
 mod pairing;
 mod problem;
 mod source;
+#[cfg(test)]
+mod tests;
 mod write;
 mod zeiss;
 
