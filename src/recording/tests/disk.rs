@@ -1,6 +1,6 @@
 //! Recordings on disk.
 
-use std::{fs, path::PathBuf};
+use std::{fs, path::PathBuf, thread};
 
 use super::{TIMES, assert_message, color, depth, factory, zips::good_zip};
 use crate::recording::{FolderSink, Limits, Recording, Writer, discover};
@@ -45,7 +45,7 @@ fn folders_and_zips_on_disk() {
     fs::write(scratch.0.join("zipped.zip"), good_zip()).unwrap();
     let zipped = Recording::open(scratch.0.join("zipped.zip"), &limits).unwrap();
     assert_eq!((zipped.name.as_str(), &zipped.frames), ("zipped", &one.frames));
-    std::thread::scope(|scope| {
+    thread::scope(|scope| {
         for _ in 0..4 {
             scope.spawn(|| {
                 for i in [0, 1, 2].repeat(20) {

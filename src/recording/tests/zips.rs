@@ -3,6 +3,7 @@
 use std::{
     io::{Cursor, Write},
     sync::Arc,
+    thread,
 };
 
 use zip::{ZipWriter, write::SimpleFileOptions};
@@ -48,7 +49,7 @@ fn zips_read_as_folders_do() {
     assert_eq!(zipped.problems, []);
     assert_eq!(zipped.rgb(1).unwrap(), plain.rgb(1).unwrap());
     // From several threads at once.
-    std::thread::scope(|scope| {
+    thread::scope(|scope| {
         for _ in 0..4 {
             scope.spawn(|| {
                 for i in [0, 1, 2].repeat(20) {
