@@ -24,18 +24,48 @@
 //! # Ok::<(), truedepth::board::Error>(())
 //! ```
 //!
+//! A [`Plan`] makes a whole recording: a [`Device`] with chosen [`Faults`] is led along a [`Trajectory`], and
+//! [`Plan::write`] puts images, depth maps, metadata, `board.toml` and `truth.json` ([`Truth`]) into a
+//! [`Sink`](crate::recording::Sink).
+//!
+//! ```
+//! use truedepth::simulate::{Device, Faults, Plan};
+//!
+//! let mut plan = Plan::new(Device::named("ipad-12.9-5gen")?, 1);
+//! plan.faults = Faults::parse(["focal=6.6%", "depth-scale=1.5%"])?;
+//! let (factory, truth) = (plan.factory().intrinsics, plan.true_camera().intrinsics);
+//! assert!((factory.fx / truth.fx - 1.066).abs() < 1e-12);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! Everything is decided by the seed: the same scene and seed give the same bytes, whatever the number of threads.
 //!
-//! Not here: files, and any judgement of what is found in a recording.
+//! Not here: folders, and any judgement of what is found in a recording.
 
-mod print;
-mod random;
-mod render;
+mod plan;
+
+mod device;
+mod fault;
+mod trajectory;
+
 mod scene;
 mod surface;
 mod wall;
 
+mod print;
+mod render;
+mod sensor;
+
+mod random;
+mod truth;
+
+pub use device::{Device, Stream, UnknownDevice};
+pub use fault::{Fault, FaultError, Faults};
+pub use plan::{Plan, SimulatedFrame};
 pub use render::{Rendered, render};
 pub use scene::{Handedness, Light, Motion, Noise, Polarity, Print, Scene, Tone, TrueCorner};
+pub use sensor::{DepthSensor, measure_depth};
 pub use surface::Surface;
-pub use wall::Wall;
+pub use trajectory::Trajectory;
+pub use truth::{Corner, SCHEMA, TrueCamera, TrueDepth, TrueFrame, TrueTable, Truth};
+pub use wall::{Office, Wall};

@@ -6,7 +6,10 @@ use rand_pcg::{Pcg64, rand_core::Rng};
 /// move another, and frames can be made in any order.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Subject {
+    Trajectory = 1,
+    Wall = 2,
     Image = 3,
+    Depth = 4,
 }
 
 /// One stream of random numbers.
@@ -32,6 +35,12 @@ impl Random {
     /// Any 64 bits.
     pub(super) fn bits(&mut self) -> u64 {
         self.0.next_u64()
+    }
+
+    /// Evenly between `low` and `high`.
+    pub(super) fn between(&mut self, low: f64, high: f64) -> f64 {
+        const UNIT: f64 = 1.0 / (1u64 << 53) as f64;
+        low + (high - low) * ((self.bits() >> 11) as f64 * UNIT)
     }
 
     /// Nearly normal with mean 0 and standard deviation 1: the sum of four 16-bit numbers (Irwin-Hall), which never

@@ -140,6 +140,13 @@ fn sharp(scene: &Scene, rim: usize) -> Plane {
                     pixel_mean(&printed, four.map(|(square, _)| square), cut, inside)
                 };
                 *value = uniform.unwrap_or_else(mean) as f32;
+                let [from, to] = [four[0].0, four[2].0];
+                let at = [0, 1].map(|i| f64::midpoint(from[i], to[i]) * scene.board.square_m);
+                if !at[0].is_nan() {
+                    let diagonal2 = (to[0] - from[0]).powi(2) + (to[1] - from[1]).powi(2);
+                    let pixel_m = (diagonal2 / 2.0).sqrt() * scene.board.square_m;
+                    *value *= scene.wall.change(at, pixel_m) as f32;
+                }
             }
             above = below;
         }
@@ -209,7 +216,7 @@ impl Flow {
         }
         let sight = Sight::new(scene);
         let displacement = |pixel: Pixel| {
-            let hit = sight.hit_plane(pixel, 0.0)?;
+            let hit = sight.hit_plane(pixel)?;
             let [u, v] = scene.camera.unproject(pixel)?;
             let z = hit.depth_m;
             let point = Point::new(u * z, v * z, z);
@@ -264,7 +271,11 @@ fn moved(sharp: &Plane, flow: &Flow) -> Plane {
         for (column, value) in values.iter_mut().enumerate() {
             let [dx, dy] = flow.at(pixel(column, row));
             // Two samples per pixel of way: bilinear interpolation fills what lies between.
-            let n = (2.0 * dx.hypot(dy)).ceil().max(1.0) as usize;
+            let n = (2.0 * (dx * dx + dy * dy).sqrt()).ceil() as usize;
+            if n <= 1 {
+                *value = sharp.values[row * stride + column];
+                continue;
+            }
             let sum: f32 = (0..n)
                 .map(|i| {
                     let time = (i as f64 + 0.5) / n as f64 - 0.5;
@@ -470,7 +481,7 @@ mod tests {
             };
             let mut worst: f64 = 0.0;
             let contrast = scene.print.paper - scene.print.ink;
-            for (i, &value) in plane.values.iter().enumerate().step_by(11) {
+            for (i, &value) in plane.values.iter().enumerate().step_by(23) {
                 let (x, y) = ((i % plane.width) as f64, (i / plane.width) as f64);
                 // Rows of samples stand askew, lest an edge along the pixels meets all samples of a row at once.
                 const N: usize = 150;

@@ -238,6 +238,17 @@ pub(super) struct Hit {
     pub(super) depth_m: f64,
 }
 
+/// What a depth sensor sees along one ray.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Seen {
+    /// Depth (z in the camera's frame), metres.
+    pub(super) depth_m: f64,
+    /// Cosine of the angle between the ray and the normal of what it meets.
+    pub(super) cos_incidence: f64,
+    /// Distance to the next step in depth, pixels.
+    pub(super) edge_px: f64,
+}
+
 impl<'a> Sight<'a> {
     pub(super) fn new(scene: &'a Scene) -> Self {
         let inverse = scene.color_from_board.inverse();
@@ -247,8 +258,11 @@ impl<'a> Sight<'a> {
     /// Where the ray through this pixel meets the printed surface or its continuation; `None` where it passes the
     /// board's plane, where the board is seen from behind, and outside the lens's domain.
     pub(super) fn hit(&self, pixel: Pixel) -> Option<Hit> {
+        self.hit_ray(self.scene.camera.unproject(pixel)?)
+    }
+
+    fn hit_ray(&self, [u, v]: [f64; 2]) -> Option<Hit> {
         let surface = &self.scene.surface;
-        let [u, v] = self.scene.camera.unproject(pixel)?;
         let mut hit = self.plane(u, v, 0.0)?;
         if !surface.is_flat() {
             // The slope of the sheet is a few per cent: each round is wrong by that factor less.
@@ -260,10 +274,32 @@ impl<'a> Sight<'a> {
         Some(hit)
     }
 
-    /// Where the ray of this pixel meets the plane `height_m` behind the board.
-    pub(super) fn hit_plane(&self, pixel: Pixel, height_m: f64) -> Option<Hit> {
+    /// Where the ray of this pixel meets the plane of the board.
+    pub(super) fn hit_plane(&self, pixel: Pixel) -> Option<Hit> {
         let [u, v] = self.scene.camera.unproject(pixel)?;
-        self.plane(u, v, height_m)
+        self.plane(u, v, 0.0)
+    }
+
+    /// What a depth sensor sees along the ray of this pixel: the sheet, the wall or what stands out from it.
+    pub(super) fn seen(&self, pixel: Pixel) -> Option<Seen> {
+        let Scene { board, print, wall, camera, .. } = self.scene;
+        let [u, v] = camera.unproject(pixel)?;
+        let mut hit = self.hit_ray([u, v])?;
+        let at = hit.square.map(|s| s * board.square_m);
+        let on_sheet = |u_m: f64, squares: usize| {
+            let size_m = squares as f64 * board.square_m;
+            (-print.margin_m..=size_m + print.margin_m).contains(&u_m)
+        };
+        let mut edge_px = f64::INFINITY;
+        if !(on_sheet(at[0], board.squares_x) && on_sheet(at[1], board.squares_y)) {
+            hit = self.plane(u, v, wall.depth_behind_m(at))?;
+            let pixel_m = hit.depth_m / camera.intrinsics.focal_px();
+            edge_px = wall.edge_distance_m(at) / pixel_m;
+        }
+        let m = &self.board_from_color;
+        let towards = m[(2, 0)] * u + m[(2, 1)] * v + m[(2, 2)];
+        let cos_incidence = towards / (u * u + v * v + 1.0).sqrt();
+        Some(Seen { depth_m: hit.depth_m, cos_incidence, edge_px })
     }
 
     fn plane(&self, u: f64, v: f64, height_m: f64) -> Option<Hit> {
