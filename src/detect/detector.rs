@@ -84,6 +84,7 @@ impl Detector {
                 rejects.push(Reject { pixel: lattice.middle(), reason: Reason::SecondLattice });
                 continue;
             }
+            lattice.prune();
             let Some(map) = lattice.map() else { continue };
             let placement = self.expected.by_bits(scales.image(), &lattice, &map).or_else(|_| {
                 let contrast = lattice.contrast;

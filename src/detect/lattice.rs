@@ -39,9 +39,36 @@ impl Lattice {
 
     /// The map from (i, j) to the image; `None` where the nodes do not span a plane.
     pub(super) fn map(&self) -> Option<SmoothMap> {
-        let nodes: Vec<([f64; 2], Pixel)> =
-            self.nodes.iter().map(|n| ([f64::from(n.i), f64::from(n.j)], n.pixel)).collect();
-        SmoothMap::fit(&nodes)
+        SmoothMap::fit(&self.pairs())
+    }
+
+    /// Number and place of every node.
+    fn pairs(&self) -> Vec<([f64; 2], Pixel)> {
+        self.nodes.iter().map(|n| ([f64::from(n.i), f64::from(n.j)], n.pixel)).collect()
+    }
+
+    /// Drops, one by one, the nodes that lie farthest from where the map through all expects them, until all lie
+    /// within a quarter of a square: a wrong link numbers everything behind it wrongly.
+    pub(super) fn prune(&mut self) {
+        // Small lattices hardly bend, and a bend would follow the wrong node.
+        let fit = |nodes: &[([f64; 2], Pixel)]| {
+            if nodes.len() < 36 { SmoothMap::homography(nodes) } else { SmoothMap::fit(nodes) }
+        };
+        while let Some(map) = fit(&self.pairs()) {
+            let misfit = |node: &Node| {
+                let (x, y) = (f64::from(node.i), f64::from(node.j));
+                let (Some(at), Some([u, v])) = (map.at(x, y), map.axes(x, y)) else {
+                    return f64::INFINITY;
+                };
+                at.distance(node.pixel) / u[0].hypot(u[1]).min(v[0].hypot(v[1]))
+            };
+            let worst =
+                self.nodes.iter().map(misfit).enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
+            match worst {
+                Some((index, misfit)) if misfit > 0.25 => self.nodes.remove(index),
+                _ => return,
+            };
+        }
     }
 
     /// Where it is, for people: one of its middle nodes.

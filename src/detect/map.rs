@@ -28,6 +28,13 @@ impl SmoothMap {
     /// The map through these corners (plane coordinates in squares, pixel), in the least-squares sense; `None` for
     /// fewer than four or where they lie on a line.
     pub(super) fn fit(corners: &[([f64; 2], Pixel)]) -> Option<Self> {
+        let mut map = Self::homography(corners)?;
+        map.fit_bend(corners);
+        Some(map)
+    }
+
+    /// As [`fit`](Self::fit), without the bend: stiff, so that a wrong corner stands out.
+    pub(super) fn homography(corners: &[([f64; 2], Pixel)]) -> Option<Self> {
         let n = corners.len();
         if n < 4 {
             return None;
@@ -109,9 +116,7 @@ impl SmoothMap {
         };
         let (rx, ry) = (row(0, pixel_center[0]), row(3, pixel_center[1]));
         let h = [rx[0], rx[1], rx[2], ry[0], ry[1], ry[2], h[6], h[7], 1.0];
-        let mut map = Self { center, scale, h, bend: Vec::new() };
-        map.fit_bend(corners);
-        Some(map)
+        Some(Self { center, scale, h, bend: Vec::new() })
     }
 
     fn fit_bend(&mut self, corners: &[([f64; 2], Pixel)]) {
