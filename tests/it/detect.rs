@@ -1,0 +1,297 @@
+//! The detector on scenes with ground truth and on the real recordings.
+
+use std::{collections::BTreeMap, fs};
+
+use truedepth::{
+    board::{CharucoBoard, Layout},
+    camera::{Camera, Distortion, Intrinsics},
+    detect::{Detector, Observation},
+    geom::{Board, Color, Pixel, Pose, Rotation, Vector3},
+    image::{Gray, Limits},
+    simulate::{Handedness, Motion, Noise, Polarity, Rendered, Scene, render},
+};
+
+const PAPER: &str = "10x8:20.875mm:10.4375mm:ARUCO_ORIGINAL";
+
+fn board(text: &str) -> CharucoBoard {
+    text.parse().expect("a board")
+}
+
+fn camera(focal_px: f64, width: usize, height: usize) -> Camera {
+    let (cx, cy) = (width as f64 / 2.0 - 0.3, height as f64 / 2.0 + 0.4);
+    let intrinsics = Intrinsics { fx: focal_px, fy: focal_px, cx, cy, width, height };
+    Camera { intrinsics, distortion: Distortion::None }
+}
+
+/// The board's middle at (0, 0, `distance_m`), turned by these angles about x, y and z (degrees).
+fn pose(board: &CharucoBoard, distance_m: f64, turn_deg: [f64; 3]) -> Pose<Color, Board> {
+    let [x, y, z] = turn_deg.map(f64::to_radians);
+    let rotation =
+        Rotation::from_euler_angles(x, y, 0.0) * Rotation::from_euler_angles(0.0, 0.0, z);
+    let middle = Vector3::new(
+        board.squares_x as f64 * board.square_m / 2.0,
+        board.squares_y as f64 * board.square_m / 2.0,
+        0.0,
+    );
+    Pose::new(rotation, Vector3::new(0.0, 0.0, distance_m) - rotation * middle)
+}
+
+/// Views from all sides, no two alike.
+fn views(board: &CharucoBoard) -> Vec<Pose<Color, Board>> {
+    [
+        (0.36, [0.0, 0.0, 0.0]),
+        (0.36, [20.0, -15.0, 31.0]),
+        (0.40, [-35.0, 10.0, 100.0]),
+        (0.45, [10.0, 45.0, -75.0]),
+        (0.28, [-12.0, -20.0, 170.0]),
+        (0.24, [25.0, 25.0, 7.0]),
+    ]
+    .map(|(distance_m, turn)| pose(board, distance_m, turn))
+    .to_vec()
+}
+
+/// Differences to the truth, per corner, with the σ claimed. Panics on a corner that is not there.
+fn errors(rendered: &Rendered, seen: &Observation) -> Vec<([f64; 2], f64)> {
+    let truth: BTreeMap<usize, Pixel> = rendered.corners.iter().map(|c| (c.id, c.pixel)).collect();
+    seen.corners
+        .iter()
+        .map(|c| {
+            let at =
+                truth.get(&c.id).unwrap_or_else(|| panic!("corner {} is not in the image", c.id));
+            let [dx, dy] = c.pixel - *at;
+            assert!(dx.hypot(dy) < 1.0, "corner {} is {dx:.2}, {dy:.2} px off", c.id);
+            ([dx, dy], c.sigma_px)
+        })
+        .collect()
+}
+
+#[test]
+fn corners_are_accurate_unbiased_and_know_their_sigma() {
+    let board = board(PAPER);
+    let detector = Detector::new(&board);
+    for (blur_sigma_px, noise) in [(0.6, 1.0), (0.9, 3.0), (1.2, 3.0)] {
+        let mut all = Vec::new();
+        let mut n_true = 0;
+        for (index, color_from_board) in views(&board).into_iter().enumerate() {
+            let mut scene = Scene::ideal(board.clone(), camera(590.0, 640, 480), color_from_board);
+            scene.blur_sigma_px = blur_sigma_px;
+            scene.noise = Noise::Gray { sigma: noise };
+            let rendered = render(&scene, index as u64);
+            n_true += rendered.corners.len();
+            all.extend(errors(&rendered, &detector.detect(&rendered.gray())));
+        }
+        let n = all.len() as f64;
+        assert!(n >= 0.98 * n_true as f64, "{n} of {n_true} corners");
+        let rms = (all.iter().map(|([x, y], _)| x * x + y * y).sum::<f64>() / n).sqrt();
+        let bias = [0, 1].map(|a| all.iter().map(|(d, _)| d[a]).sum::<f64>() / n);
+        let variance =
+            all.iter().map(|([x, y], s)| (x * x + y * y) / (2.0 * s * s)).sum::<f64>() / n;
+        println!(
+            "blur {blur_sigma_px} noise {noise}: {n} corners, rms {rms:.4} px, bias {:+.4} {:+.4} px, \
+             normalised variance {variance:.2}",
+            bias[0], bias[1]
+        );
+        assert!(rms < 0.05, "blur {blur_sigma_px}, noise {noise}: rms {rms} px");
+        assert!(bias[0].abs().max(bias[1].abs()) < 0.01, "bias {bias:?} px");
+        assert!((0.8..1.2).contains(&variance), "blur {blur_sigma_px}, noise {noise}: {variance}");
+    }
+}
+
+#[test]
+fn layouts_are_told_apart() {
+    for layout in [Layout::Legacy, Layout::New] {
+        let board = board(PAPER);
+        let mut scene = Scene::ideal(board.clone(), camera(590.0, 640, 480), views(&board)[1]);
+        scene.print.layout = layout;
+        scene.blur_sigma_px = 0.8;
+        let rendered = render(&scene, 1);
+        let seen = Detector::new(&board).detect(&rendered.gray());
+        assert_eq!(seen.identity.as_ref().map(|i| i.layout), Some(layout));
+        assert_eq!(errors(&rendered, &seen).len(), 63);
+    }
+}
+
+#[test]
+fn mirrored_and_inverted_prints_are_recognised() {
+    let board = board(PAPER);
+    for (handedness, polarity) in [
+        (Handedness::Mirrored, Polarity::BlackOnWhite),
+        (Handedness::AsDesigned, Polarity::WhiteOnBlack),
+        (Handedness::Mirrored, Polarity::WhiteOnBlack),
+    ] {
+        let mut scene = Scene::ideal(board.clone(), camera(590.0, 640, 480), views(&board)[1]);
+        (scene.print.handedness, scene.print.polarity) = (handedness, polarity);
+        scene.blur_sigma_px = 0.8;
+        let rendered = render(&scene, 1);
+        let seen = Detector::new(&board).detect(&rendered.gray());
+        let identity = seen.identity.as_ref().expect("identified");
+        assert_eq!(identity.mirrored, handedness == Handedness::Mirrored);
+        assert_eq!(identity.inverted, polarity == Polarity::WhiteOnBlack);
+        assert_eq!(errors(&rendered, &seen).len(), 63);
+    }
+}
+
+#[test]
+fn other_boards_and_sizes() {
+    for (text, width, height, focal_px, distance_m) in [
+        ("7x5:30mm:21mm:4X4_50", 1280, 720, 900.0, 0.45),
+        ("5x7:40mm:20mm:6X6_250", 640, 480, 500.0, 0.5),
+        ("12x9:15mm:11mm:5X5_1000", 1440, 1080, 1200.0, 0.35),
+        ("9x6:25mm:18mm:APRILTAG_36h11", 800, 600, 700.0, 0.4),
+        ("8x6:30mm:22mm:7X7_250", 4032, 3024, 3000.0, 0.4),
+        ("6x4:30mm:22mm:4X4_50", 160, 120, 130.0, 0.3),
+    ] {
+        let board = board(text);
+        let mut scene = Scene::ideal(
+            board.clone(),
+            camera(focal_px, width, height),
+            pose(&board, distance_m, [18.0, -12.0, 25.0]),
+        );
+        scene.blur_sigma_px = 0.7 * (width as f64 / 640.0).max(1.0);
+        scene.noise = Noise::Gray { sigma: 2.0 };
+        let rendered = render(&scene, 3);
+        let seen = Detector::new(&board).detect(&rendered.gray());
+        let found = errors(&rendered, &seen).len();
+        let whole = rendered
+            .corners
+            .iter()
+            .filter(|c| {
+                let inside = |v: f64, size: usize| v > 8.0 && v < size as f64 - 9.0;
+                inside(c.pixel.x, width) && inside(c.pixel.y, height)
+            })
+            .count();
+        assert!(found >= whole, "{text}: {found} of {whole} corners: {:?}", seen.rejects);
+    }
+}
+
+#[test]
+fn motion_does_not_hide_the_board() {
+    let board = board(PAPER);
+    for (index, color_from_board) in views(&board).into_iter().enumerate() {
+        for motion_px in [4.0, 7.0] {
+            let mut scene = Scene::ideal(board.clone(), camera(590.0, 640, 480), color_from_board);
+            let distance_m = 0.35;
+            let angle = 0.7 * index as f64;
+            scene.motion = Motion {
+                translation_m: Vector3::new(angle.cos(), angle.sin(), 0.0)
+                    * (motion_px * distance_m / 590.0),
+                ..Motion::NONE
+            };
+            scene.blur_sigma_px = 0.8;
+            scene.noise = Noise::Gray { sigma: 2.0 };
+            let rendered = render(&scene, index as u64);
+            let seen = Detector::new(&board).detect(&rendered.gray());
+            let found = errors(&rendered, &seen).len();
+            let n_true = rendered.corners.len();
+            assert!(
+                found as f64 >= 0.9 * n_true as f64,
+                "view {index}, {motion_px} px: {found} of {n_true}"
+            );
+        }
+    }
+}
+
+#[test]
+fn nothing_is_found_where_nothing_is() {
+    let detector = Detector::new(&board(PAPER));
+    let mut state = 1_u64;
+    let mut random = || {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 33) as u8
+    };
+    let image = |width: usize, height: usize, f: &mut dyn FnMut(usize, usize) -> u8| {
+        let pixels = (0..width * height).map(|i| f(i % width, i / width)).collect();
+        Gray::new(width, height, pixels)
+    };
+    let images = [
+        ("black", image(640, 480, &mut |_, _| 0)),
+        ("white", image(640, 480, &mut |_, _| 255)),
+        ("noise", image(640, 480, &mut |_, _| random())),
+        (
+            "checkerboard",
+            image(640, 480, &mut |x, y| if (x / 40 + y / 40) % 2 == 0 { 30 } else { 220 }),
+        ),
+        (
+            "fine checkerboard",
+            image(640, 480, &mut |x, y| if (x / 9 + y / 9) % 2 == 0 { 30 } else { 220 }),
+        ),
+        ("pixel checkerboard", image(640, 480, &mut |x, y| if (x + y) % 2 == 0 { 0 } else { 255 })),
+        ("blinds", image(640, 480, &mut |_, y| if y / 11 % 2 == 0 { 30 } else { 220 })),
+        (
+            "bricks",
+            image(640, 480, &mut |x, y| {
+                let mortar = y % 24 < 3 || (x + y / 24 % 2 * 30) % 60 < 3;
+                if mortar { 200 } else { 90 }
+            }),
+        ),
+        (
+            "keyboard",
+            image(640, 480, &mut |x, y| {
+                let key = x % 32 > 3 && y % 32 > 3;
+                let glyph = x % 32 > 10 && x % 32 < 22 && y % 32 > 10 && y % 32 < 22;
+                if !key {
+                    20
+                } else if glyph {
+                    (x * 7 + y * 13 + x / 32 * 91 + y / 32 * 57) as u8
+                } else {
+                    210
+                }
+            }),
+        ),
+        ("1x1", image(1, 1, &mut |_, _| 9)),
+        ("2x480", image(2, 480, &mut |_, y| y as u8)),
+        ("empty", Gray::new(0, 0, Vec::new())),
+    ];
+    for (name, image) in images {
+        let seen = detector.detect(&image);
+        assert!(seen.corners.is_empty() && seen.identity.is_none(), "{name}: {:?}", seen.identity);
+    }
+}
+
+#[test]
+fn no_corner_is_invented_on_the_real_recordings() {
+    let Some(root) = crate::data("zeiss") else { return };
+    let truth: serde_json::Value =
+        serde_json::from_slice(&fs::read(root.join("truth.json")).expect("truth.json"))
+            .expect("JSON");
+    let detector = Detector::new(&board(PAPER));
+    let (mut found, mut all) = (0, 0);
+    let mut missed = Vec::new();
+    for (path, frame) in truth.as_object().expect("an object") {
+        let bytes = fs::read(root.join(path)).expect(path);
+        let seen = detector.detect(&Gray::from_png(&bytes, &Limits::default()).expect(path));
+        let corners = |key: &str| -> BTreeMap<usize, Pixel> {
+            let Some(map) = frame[key].as_object() else { return BTreeMap::new() };
+            map.iter()
+                .map(|(id, at)| {
+                    let coordinate = |k: usize| at[k].as_f64().expect("a number");
+                    (id.parse().expect("an id"), Pixel::new(coordinate(0), coordinate(1)))
+                })
+                .collect()
+        };
+        let (required, optional) = (corners("corners"), corners("optional"));
+        let tolerance = if frame["quality"] == "blurred" { 3.0 } else { 1.5 };
+        all += required.len();
+        for corner in &seen.corners {
+            if let Some(at) = required.get(&corner.id) {
+                let distance = corner.pixel.distance(*at);
+                assert!(
+                    distance <= tolerance,
+                    "{path}: corner {} is {distance:.2} px off",
+                    corner.id
+                );
+                found += 1;
+            } else {
+                let near =
+                    optional.get(&corner.id).is_some_and(|at| corner.pixel.distance(*at) <= 3.0);
+                assert!(near, "{path}: corner {} is not there", corner.id);
+            }
+        }
+        if seen.corners.is_empty() {
+            missed.push(path.clone());
+        }
+    }
+    let recall = f64::from(found) / all as f64;
+    println!("{found} of {all} corners ({:.2} %), no board in {missed:?}", 100.0 * recall);
+    assert!(recall >= 0.97, "{found} of {all}");
+}
