@@ -1,25 +1,115 @@
-//! Intrinsics from many views, with uncertainties. (skeleton: types only)
+//! Intrinsics from many views, with uncertainties.
+//!
+//! [`calibrate`] takes the corners of many frames ([`Input`]) to a [`Calibration`]: a camera, the views it was found
+//! from, and a covariance. [`Method`] says how: exactly as the paper, or by the best of several [`Model`]s, chosen by
+//! how well views are predicted that took no part. Beside it stands a [`DistortionTest`]: how much of the lens'
+//! distortion is still in the stream, from the pixels alone.
+//!
+//! Every σ is the larger of two: the classical one (independent corner noise, its size taken from the residuals) and
+//! one that lets residuals of the same picture be correlated in any way, as those of a board that is not quite flat
+//! are ([`solve::clustered`](crate::solve::clustered)).
+//!
+//! ```
+//! use truedepth::board::CharucoBoard;
+//! use truedepth::calibrate::{FrameCorners, Input, Method, calibrate};
+//! use truedepth::camera::{Camera, Distortion, Intrinsics};
+//! use truedepth::detect::Corner;
+//! use truedepth::geom::{Board, Color, Pose, Rotation, Vector3};
+//!
+//! let board: CharucoBoard = "10x8:20.875mm:10.4375mm:ARUCO_ORIGINAL".parse()?;
+//! let truth = Intrinsics { fx: 530.0, fy: 530.0, cx: 320.6, cy: 241.2, width: 640, height: 480 };
+//! let camera = Camera { intrinsics: truth, distortion: Distortion::None };
+//! let frames: Vec<FrameCorners> = (0..8)
+//!     .map(|i| {
+//!         let azimuth = f64::from(i) * 0.8;
+//!         let turn = Rotation::from_scaled_axis(Vector3::new(azimuth.cos(), azimuth.sin(), 0.0) * 0.6);
+//!         let centre = Vector3::new(0.104, 0.0835, 0.0);
+//!         let pose: Pose<Color, Board> = Pose::new(turn, Vector3::new(0.0, 0.0, 0.3) - turn * centre);
+//!         let see = |id| Some(Corner { id, pixel: camera.project(pose * board.corner(id))?, sigma_px: 0.05 });
+//!         FrameCorners { frame: i as usize, corners: (0..board.n_corners()).filter_map(see).collect() }
+//!     })
+//!     .collect();
+//! let factory = Intrinsics { fx: 565.1, fy: 565.1, ..truth };
+//! let input = Input { board: &board, factory: &factory, tables: None, frames: &frames };
+//! let found = calibrate(&input, Method::Auto)?;
+//! assert!((found.camera.intrinsics.fx - 530.0).abs() < 1e-3);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Not here: images, files, verdicts; the board's own shape.
 
-use crate::{camera::Camera, pose::View};
+mod model;
 
-/// Which parameters are free.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Model {
-    /// One focal length; principal point as the factory says, no distortion.
-    Focal,
-    /// As `Focal`, corners first taken through Apple's inverse table.
-    FocalTable,
-    /// One focal length and the principal point.
-    FocalCentre,
-    /// As `FocalCentre`, corners first taken through Apple's inverse table.
-    FocalTableCentre,
-    /// One focal length, principal point, k1 k2 p1 p2 k3.
-    Brown,
+mod problem;
+
+mod fit;
+
+mod views;
+
+mod weigh;
+
+mod auto;
+
+mod distortion;
+
+mod job;
+
+#[cfg(test)]
+mod golden;
+
+pub use job::calibrate;
+pub use model::Model;
+
+use crate::{
+    board::CharucoBoard,
+    camera::{Camera, Intrinsics, TablePair},
+    detect::Corner,
+    pose::View,
+};
+
+/// What a calibration starts from.
+#[derive(Clone, Copy, Debug)]
+pub struct Input<'a> {
+    /// The board.
+    pub board: &'a CharucoBoard,
+    /// The factory's intrinsics: the start, and what stays fixed where a model does not free it (principal point,
+    /// fy/fx).
+    pub factory: &'a Intrinsics,
+    /// Apple's lookup tables, where the recording has them.
+    pub tables: Option<&'a TablePair>,
+    /// What was seen. The order matters to [`Method::Paper`] alone.
+    pub frames: &'a [FrameCorners],
+}
+
+/// The corners of one frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrameCorners {
+    /// Index of the frame in the recording.
+    pub frame: usize,
+    /// Its corners.
+    pub corners: Vec<Corner>,
+}
+
+/// How to calibrate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// As the paper (arXiv:2201.10865, section 5.1): frames in order, at least 9 corners, a view is skipped whose
+    /// camera stood less than 4 cm from that of an accepted one (poses with factory intrinsics); then one focal
+    /// length, all corners alike, no robust loss.
+    Paper,
+    /// All usable views, corners weighed by their σ, outliers left out, the model chosen by held-out prediction.
+    Auto,
+    /// As `Auto`, with this model.
+    Robust(Model),
+    /// Least squares of all corners alike with this model, as `cv2.calibrateCamera`.
+    Plain(Model),
 }
 
 /// The result of a calibration.
 #[derive(Clone, Debug)]
 pub struct Calibration {
+    /// How it was made.
+    pub method: Method,
     /// The model that was chosen or asked for.
     pub model: Model,
     /// The camera: intrinsics and distortion as estimated.
@@ -28,16 +118,42 @@ pub struct Calibration {
     pub parameters: Vec<Parameter>,
     /// Covariance of `parameters` (row-major), poses marginalised.
     pub covariance: Vec<f64>,
-    /// Views used.
+    /// Views used, by frame, with the corners that took part.
     pub views: Vec<View>,
+    /// How many different pictures these views are: views whose corners lie within 4 % of the image's width of each
+    /// other count once.
+    pub n_pictures: usize,
     /// RMS over all corners of all views, 2-D distance as OpenCV, pixels.
     pub rms_px: f64,
     /// All models tried, with held-out errors (method auto), for the report.
     pub candidates: Vec<Candidate>,
-    /// Focal length of two disjoint halves of the views, px, where there are enough.
+    /// Focal length of two disjoint halves of the views (every other one), px, where each half determines one.
     pub split_half_focal_px: Option<[Estimate; 2]>,
-    /// Corners left out by the robust loss: (frame, corner id, residual px).
+    /// How much distortion is left in the stream; not with [`Method::Paper`] and [`Method::Plain`], and `None` where
+    /// the views do not determine it.
+    pub distortion: Option<DistortionTest>,
+    /// Corners left out.
     pub outliers: Vec<Outlier>,
+    /// Frames left out, by frame.
+    pub rejected: Vec<RejectedFrame>,
+}
+
+impl Calibration {
+    /// Corners of all views.
+    pub fn n_corners(&self) -> usize {
+        self.views.iter().map(|view| view.corners.len()).sum()
+    }
+
+    /// A free parameter by its name, e.g. `focal_px`; `None` where it is not free.
+    pub fn parameter(&self, name: &str) -> Option<Estimate> {
+        self.parameters.iter().find(|p| p.name == name).map(|p| p.estimate)
+    }
+
+    /// The focal length along x, pixels. Free in every model.
+    pub fn focal_px(&self) -> Estimate {
+        self.parameter("focal_px")
+            .unwrap_or(Estimate { value: self.camera.intrinsics.fx, sigma: f64::INFINITY })
+    }
 }
 
 /// A number and how sure we are of it.
@@ -63,10 +179,15 @@ pub struct Parameter {
 pub struct Candidate {
     /// Which.
     pub model: Model,
-    /// Fit to the data it was fitted to, pixels.
+    /// Fit to the data it was fitted to, pixels (2-D distance).
     pub rms_px: f64,
-    /// RMS on corners that were held out, pixels.
+    /// RMS on pictures that were held out, pixels (2-D distance): intrinsics from all other pictures, only the six
+    /// numbers of each pose fitted; corrected for these six; corners weighed as in the fit. Infinite where the other
+    /// pictures do not determine the model.
     pub held_out_rms_px: f64,
+    /// By how much the held-out mean square exceeds that of the best candidate, in standard errors of that
+    /// difference (pictures paired); 0 for the best.
+    pub behind_best_sigmas: f64,
     /// Its focal length.
     pub focal_px: Estimate,
 }
@@ -80,4 +201,155 @@ pub struct Outlier {
     pub id: usize,
     /// Distance to its prediction, pixels.
     pub residual_px: f64,
+    /// The same in standard deviations of what corners like it scatter by.
+    pub residual_sigmas: f64,
+}
+
+/// A frame that took no part.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RejectedFrame {
+    /// Frame index.
+    pub frame: usize,
+    /// Why.
+    pub reason: Rejection,
+}
+
+/// Why a frame took no part.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Rejection {
+    /// Too few corners.
+    FewCorners {
+        /// How many.
+        n_corners: usize,
+        /// How many are asked for.
+        needed: usize,
+    },
+    /// Corners that hardly spread in one direction of the board.
+    NarrowCorners {
+        /// How many.
+        n_corners: usize,
+    },
+    /// No pose explains the corners.
+    NoPose(crate::pose::Error),
+    /// The camera stood where it had stood before ([`Method::Paper`]).
+    NearAccepted {
+        /// The accepted frame.
+        accepted: usize,
+        /// Distance between both camera positions, metres.
+        distance_m: f64,
+    },
+    /// More than a third of its corners disagree with all other frames: the board was not what it was taken for, or
+    /// moved while the shutter was open.
+    Disagrees {
+        /// How many disagree.
+        n_outliers: usize,
+        /// Out of so many.
+        n_corners: usize,
+    },
+}
+
+/// How much of the lens' distortion is left in the stream, from the pixels alone. Focal length and principal point are
+/// free in every hypothesis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DistortionTest {
+    /// The share a of the inverse table that straightens the stream best, p' = c + (1 + a·m(r))·(p − c): 0 where the
+    /// stream is rectified, 1 where it is as the lens drew it, −1 where it was rectified twice. `None` without tables.
+    pub amplitude: Option<Estimate>,
+    /// Brown's k1, with k2 beside it where held-out pictures ask for it.
+    pub k1: Estimate,
+    /// Brown's k2, where held-out pictures ask for it.
+    pub k2: Option<Estimate>,
+    /// How far the lens draws the farthest image corner outside its rectilinear place, pixels (inside: negative): by
+    /// the table's amplitude where there are tables, else by k1 (and k2).
+    pub corner_shift_px: Estimate,
+    /// The same as the inverse table has it (amplitude 1). `None` without tables.
+    pub table_corner_shift_px: Option<f64>,
+    /// RMS under each hypothesis.
+    pub hypotheses: Vec<Hypothesis>,
+}
+
+/// One assumption about the stream, and how well it explains the corners.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hypothesis {
+    /// Which.
+    pub lens: Lens,
+    /// RMS of the residuals, 2-D distance, pixels.
+    pub rms_px: f64,
+    /// As [`Candidate::held_out_rms_px`].
+    pub held_out_rms_px: f64,
+    /// Focal length under it.
+    pub focal_px: Estimate,
+}
+
+/// What lies between the stream and a pinhole.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Lens {
+    /// Nothing: the stream is rectified.
+    None,
+    /// The inverse table rectifies it: the stream is as the lens drew it.
+    InverseTable,
+    /// The forward table does: the stream was rectified twice.
+    ForwardTable,
+    /// A free share of the inverse table.
+    FreeTable,
+    /// Brown's k1, free, and k2 where held-out pictures ask for it.
+    FreeRadial,
+}
+
+/// A calibration that cannot be made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// Too few usable views.
+    #[error(
+        "{n_views} of {n_frames} frames show the board well enough (at least {min_corners} corners, spread in both \
+         directions); a calibration needs {needed} different views. Record 15 or more, tilted by 20° to 45° to all sides"
+    )]
+    TooFewViews {
+        /// Frames given.
+        n_frames: usize,
+        /// Frames usable.
+        n_views: usize,
+        /// Frames needed.
+        needed: usize,
+        /// Corners a frame needs.
+        min_corners: usize,
+    },
+    /// Views that leave the focal length open.
+    #[error(
+        "the {n_views} views ({n_pictures} different pictures, tilted by at most {max_tilt_deg:.0}°) do not determine \
+         the focal length{}. Record 15 or more views tilted by 20° to 45° to all sides",
+        focal_px.map_or(String::new(), |f| format!(" (it comes out as {:.0} ± {:.0} px)", f.value, f.sigma))
+    )]
+    Underdetermined {
+        /// Views used.
+        n_views: usize,
+        /// How many of them differ.
+        n_pictures: usize,
+        /// Largest angle between optical axis and board normal, degrees.
+        max_tilt_deg: f64,
+        /// What came out, where anything did.
+        focal_px: Option<Estimate>,
+    },
+    /// A model that needs tables, without tables.
+    #[error("model {} needs Apple's lens distortion tables, and the recording has none", model.name())]
+    NoTables {
+        /// Which.
+        model: Model,
+    },
+    /// Factory intrinsics that make no camera.
+    #[error(
+        "factory intrinsics with focal lengths {fx_px}, {fy_px} px and principal point ({cx_px}, {cy_px}) px: no camera has these"
+    )]
+    Factory {
+        /// Focal length.
+        fx_px: f64,
+        /// Focal length.
+        fy_px: f64,
+        /// Principal point.
+        cx_px: f64,
+        /// Principal point.
+        cy_px: f64,
+    },
 }

@@ -112,10 +112,25 @@ impl Camera {
     /// The pixel of [`project`](Self::project) and its partial derivatives (rows x, y, pixels) by the point (columns
     /// x, y, z, metres); `None` where there is no projection.
     pub fn project_with_jacobian(&self, point: Point<Color>) -> Option<(Pixel, [[f64; 3]; 2])> {
-        let pixel = self.project(point)?;
         let z = point.z();
-        let [u, v] = [point.x() / z, point.y() / z];
-        let [[a, b], [c, d]] = self.d_pixel_d_ray([u, v], pixel)?;
+        if !(z > 0.0) {
+            return None;
+        }
+        let ray @ [u, v] = [point.x() / z, point.y() / z];
+        let Intrinsics { fx, fy, .. } = self.intrinsics;
+        let (pixel, [[a, b], [c, d]]) = match &self.distortion {
+            Distortion::None => (self.intrinsics.pixel_from_ray(ray), [[fx, 0.0], [0.0, fy]]),
+            Distortion::Brown(brown) => {
+                let pixel = self.intrinsics.pixel_from_ray(brown.distort(ray)?);
+                let [[a, b], [c, d]] = brown.d_distorted_d_ray(ray);
+                (pixel, [[fx * a, fx * b], [fy * c, fy * d]])
+            }
+            Distortion::Table(tables) => {
+                let straight = self.intrinsics.pixel_from_ray(ray);
+                let (pixel, [[a, b], [c, d]]) = tables.inverse.invert_with_jacobian(straight)?;
+                (pixel, [[a * fx, b * fy], [c * fx, d * fy]])
+            }
+        };
         let jacobian = [[a / z, b / z, -(a * u + b * v) / z], [c / z, d / z, -(c * u + d * v) / z]];
         Some((pixel, jacobian))
     }
@@ -123,24 +138,6 @@ impl Camera {
     /// The partial derivatives of [`project_with_jacobian`](Self::project_with_jacobian) alone.
     pub fn d_pixel_d_point(&self, point: Point<Color>) -> Option<[[f64; 3]; 2]> {
         Some(self.project_with_jacobian(point)?.1)
-    }
-
-    /// Partial derivatives of `pixel` (rows x, y), where this direction is drawn, by the direction (columns).
-    fn d_pixel_d_ray(&self, ray: [f64; 2], pixel: Pixel) -> Option<[[f64; 2]; 2]> {
-        let Intrinsics { fx, fy, .. } = self.intrinsics;
-        Some(match &self.distortion {
-            Distortion::None => [[fx, 0.0], [0.0, fy]],
-            Distortion::Brown(brown) => {
-                let [[a, b], [c, d]] = brown.d_distorted_d_ray(ray);
-                [[fx * a, fx * b], [fy * c, fy * d]]
-            }
-            Distortion::Table(tables) => {
-                // The inverse of the inverse table's matrix.
-                let [[a, b], [c, d]] = tables.inverse.d_applied_d_pixel(pixel)?;
-                let det = a * d - b * c;
-                [[fx * d / det, -fy * b / det], [-fx * c / det, fy * a / det]]
-            }
-        })
     }
 
     /// The direction (x/z, y/z) that the lens draws at this pixel; `None` outside the domain of the distortion

@@ -42,6 +42,7 @@ pub struct TablePair {
 }
 
 /// One piece of the piecewise linear magnification: m(r) = offset + slope·r for start ≤ r ≤ end.
+#[derive(Clone, Copy)]
 struct Segment {
     start: f64,
     end: f64,
@@ -141,7 +142,27 @@ impl RadialTable {
     /// Exact: on each piece r·(1 + m(r)) is a parabola, which is solved in closed form.
     pub fn invert(&self, pixel: Pixel) -> Option<Pixel> {
         let offset = pixel - self.center;
+        let (_, _, scale) = self.inverse_on_segment(offset[0].hypot(offset[1]))?;
+        Some(self.moved(offset, scale))
+    }
+
+    /// The pixel of [`invert`](Self::invert) and its partial derivatives (rows x, y) by the pixel put in (columns).
+    /// At the samples' radii, where the table has a kink, those of the inner piece.
+    pub fn invert_with_jacobian(&self, pixel: Pixel) -> Option<(Pixel, [[f64; 2]; 2])> {
+        let offset = pixel - self.center;
         let mapped = offset[0].hypot(offset[1]);
+        let (segment, r, scale) = self.inverse_on_segment(mapped)?;
+        // Along the radius dr/dmapped = 1/(r·(1 + m))', across it r/mapped.
+        let along = 1.0 / segment.derivative(r);
+        let [ux, uy] = if mapped > 0.0 { offset.map(|o| o / mapped) } else { [1.0, 0.0] };
+        let bend = along - scale;
+        let cross = bend * ux * uy;
+        let jacobian = [[scale + bend * ux * ux, cross], [cross, scale + bend * uy * uy]];
+        Some((self.moved(offset, scale), jacobian))
+    }
+
+    /// The piece and the radius that the table takes to this radius, and the ratio of both.
+    fn inverse_on_segment(&self, mapped: f64) -> Option<(Segment, f64, f64)> {
         if !mapped.is_finite() {
             return None;
         }
@@ -158,15 +179,21 @@ impl RadialTable {
             if !(discriminant > 0.0) {
                 return None;
             }
-            let r = 2.0 * mapped / (b + discriminant.sqrt());
             // Where the next piece begins, rounding decides which of both holds the root.
-            let r = r.clamp(segment.start, segment.end);
+            let r = (2.0 * mapped / (b + discriminant.sqrt())).clamp(segment.start, segment.end);
             if !(segment.derivative(r) > 0.0) {
                 return None;
             }
-            return Some(self.moved(offset, if mapped > 0.0 { r / mapped } else { 1.0 / b }));
+            return Some((segment, r, if mapped > 0.0 { r / mapped } else { 1.0 / b }));
         }
         None
+    }
+
+    /// The table whose magnification is `amplitude` times this one's: 0 moves nothing, 1 is this table.
+    #[must_use]
+    pub fn scaled(&self, amplitude: f64) -> Self {
+        let magnification = self.magnification.iter().map(|m| amplitude * m).collect();
+        Self { magnification, ..*self }
     }
 
     /// Partial derivatives of [`apply`](Self::apply) (rows x', y') by the pixel (columns x, y); `None` outside the
@@ -332,6 +359,14 @@ mod tests {
                     assert!((analytic[row][column] - numeric[row]).abs() < 2e-4, "{pixel:?}");
                 }
             }
+        }
+        for pixel in grid().chain([table.center]) {
+            let mapped = table.apply(pixel).unwrap();
+            let (back, [[a, b], [c, d]]) = table.invert_with_jacobian(mapped).unwrap();
+            assert_eq!(Some(back), table.invert(mapped));
+            let [[e, f], [g, h]] = table.d_applied_d_pixel(back).unwrap();
+            let product = [a * e + b * g - 1.0, a * f + b * h, c * e + d * g, c * f + d * h - 1.0];
+            assert!(product.iter().all(|p| p.abs() < 1e-12), "{pixel:?} {product:?}");
         }
         let at_center = table.d_applied_d_pixel(table.center).unwrap();
         assert_eq!(at_center, [[1.0 - 0.0018, 0.0], [0.0, 1.0 - 0.0018]]);

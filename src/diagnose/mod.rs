@@ -29,6 +29,9 @@ mod td501_distortion_centre;
 mod td503_intrinsics_size;
 mod td504_field_of_view;
 
+#[cfg(test)]
+mod tests;
+
 pub use case::{Case, diagnose};
 pub use code::{Code, UnknownCode};
 pub use device::{Device, DistortionState, Sensor};

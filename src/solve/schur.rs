@@ -133,6 +133,11 @@ impl<const S: usize, const B: usize> BlockNormal<S, B> {
         Some(reduced)
     }
 
+    /// The diagonal of U: what the block would say about each shared parameter if all others were known.
+    pub fn shared_diagonal(&self) -> [f64; S] {
+        std::array::from_fn(|i| self.u[i][i])
+    }
+
     /// (V)⁻¹, the covariance of the block's own parameters for unit variance with the shared ones known; `None` where
     /// they are not determined.
     pub fn block_covariance(&self) -> Option<[[f64; B]; B]> {

@@ -1,0 +1,272 @@
+//! The best of several models, by how well they predict pictures that took no part.
+
+use super::{
+    Candidate, Error, Estimate, Input, Model, Outlier, RejectedFrame,
+    fit::{Data, Fit, fit},
+    model::{Center, Shape, Warp},
+    problem::Measured,
+    views::{self, MIN_CORNERS, all_usable},
+    weigh::{drop_outliers, weigh},
+};
+use crate::{
+    camera::Camera,
+    geom::Point,
+    pose::Weighting,
+    solve::{Loss, mean, standard_error},
+};
+
+/// A focal length less certain than this share of itself is none.
+pub(super) const MAX_FOCAL_SIGMA: f64 = 0.03;
+
+/// Pictures a calibration needs: fewer cannot even disagree.
+pub(super) const MIN_PICTURES: usize = 3;
+
+/// Corners up to so many standard deviations count in full, beyond only linearly: 1 % of normal ones do.
+const LOSS: Loss = Loss::Huber { threshold: 3.0 };
+
+/// Views, weighed, without outliers, ready for any model.
+pub(super) struct Prepared {
+    pub(super) views: Vec<Measured>,
+    pub(super) outliers: Vec<Outlier>,
+    pub(super) rejected: Vec<RejectedFrame>,
+    pub(super) pictures: Vec<usize>,
+}
+
+impl Prepared {
+    pub(super) fn references(&self) -> Vec<&Measured> {
+        self.views.iter().collect()
+    }
+
+    pub(super) fn n_pictures(&self) -> usize {
+        self.pictures.iter().max().map_or(0, |last| last + 1)
+    }
+
+    /// Turns the sum over held-out pictures into an RMS of 2-D distances, pixels.
+    pub(super) fn held_out_rms_px(&self, fit: &Fit) -> f64 {
+        let weights: f64 = self.views.iter().flat_map(|v| &v.weights).sum();
+        let n = self.views.iter().map(|v| v.corners.len()).sum::<usize>() as f64;
+        // Each pose took six residuals' worth from 2n.
+        let degrees = 2.0 * n - 6.0 * self.views.len() as f64;
+        let total: f64 = fit.held_out.iter().sum();
+        (total / weights * (2.0 * n / degrees)).sqrt()
+    }
+}
+
+/// Gathers all usable views; weighs their corners and finds outliers under a model that no lens of ours is far from
+/// (focal length, centre, k1, k2), so that what is left out does not depend on the model judged later.
+pub(super) fn prepare(input: &Input<'_>) -> Result<Prepared, Error> {
+    let weighting = Weighting::Sigma { floor_px: 0.1 };
+    let mut gathered = all_usable(input, MIN_CORNERS, weighting);
+    views::require(input, &gathered, MIN_PICTURES, MIN_CORNERS)?;
+    let pinhole =
+        Camera { intrinsics: *input.factory, distortion: crate::camera::Distortion::None };
+    let first = residuals_px(&gathered.views, &pinhole);
+    weigh(&mut gathered.views, &first, 1.0);
+
+    let flexible = [
+        Shape { center: Center::Free, warp: Warp::FreeRadial2 },
+        Shape { center: Center::Free, warp: Warp::None },
+        Shape { center: Center::Fixed, warp: Warp::None },
+    ];
+    let mut outliers = Vec::new();
+    let mut rejected = gathered.rejected;
+    // Once with a loss that forgives gross errors, once with those gone.
+    for loss in [Loss::Cauchy { scale: 3.0 }, LOSS] {
+        let references: Vec<&Measured> = gathered.views.iter().collect();
+        let pictures = views::pictures(&references, input.factory.width);
+        let data = Data { factory: input.factory, views: &references, pictures: &pictures, loss };
+        let poses: Vec<_> = gathered.views.iter().map(|v| v.pose).collect();
+        let undetermined = |focal_px| Error::Underdetermined {
+            n_views: references.len(),
+            n_pictures: data.n_pictures(),
+            max_tilt_deg: views::max_tilt_deg(poses.iter()),
+            focal_px,
+        };
+        if data.n_pictures() < MIN_PICTURES {
+            return Err(undetermined(None));
+        }
+        let mut closest: Option<Estimate> = None;
+        let found = flexible.iter().find_map(|shape| {
+            let fit = fit(*shape, &data, &shape.start(input.factory), &poses)?;
+            let focal = fit.focal_px();
+            if focal.sigma <= MAX_FOCAL_SIGMA * focal.value {
+                return Some((fit, *shape));
+            }
+            closest = focal.sigma.is_finite().then_some(focal).or(closest);
+            None
+        });
+        let (fit, shape) = found.ok_or_else(|| undetermined(closest))?;
+        let camera = shape.camera(input.factory, input.tables, &fit.free);
+        for (view, pose) in gathered.views.iter_mut().zip(&fit.poses) {
+            view.pose = *pose;
+        }
+        let residuals = residuals_px(&gathered.views, &camera);
+        let n_corners: usize = residuals.iter().map(Vec::len).sum();
+        let taken = (fit.free.len() + 6 * residuals.len()) as f64;
+        weigh(&mut gathered.views, &residuals, 1.0 - taken / (2 * n_corners) as f64);
+        let (corners, frames) = drop_outliers(&mut gathered.views, &residuals, MIN_CORNERS);
+        outliers.extend(corners);
+        rejected.extend(frames);
+        if gathered.views.len() < MIN_PICTURES {
+            return Err(Error::TooFewViews {
+                n_frames: input.frames.len(),
+                n_views: gathered.views.len(),
+                needed: MIN_PICTURES,
+                min_corners: MIN_CORNERS,
+            });
+        }
+    }
+    outliers.sort_by_key(|o| (o.frame, o.id));
+    rejected.sort_by_key(|r| r.frame);
+    let references: Vec<&Measured> = gathered.views.iter().collect();
+    let pictures = views::pictures(&references, input.factory.width);
+    drop(references);
+    Ok(Prepared { views: gathered.views, outliers, rejected, pictures })
+}
+
+/// Observed minus projected; a corner that does not project is infinitely far off.
+pub(super) fn residuals_px(views: &[Measured], camera: &Camera) -> Vec<Vec<[f64; 2]>> {
+    views
+        .iter()
+        .map(|view| {
+            view.corners
+                .iter()
+                .zip(&view.points)
+                .map(|(corner, point)| {
+                    match camera.project(view.pose * Point::from_coords(*point)) {
+                        Some(pixel) => corner.pixel - pixel,
+                        None => [f64::INFINITY; 2],
+                    }
+                })
+                .collect()
+        })
+        .collect()
+}
+
+/// A shape fitted to prepared views, from the factory's numbers.
+pub(super) fn fit_prepared(
+    input: &Input<'_>,
+    prepared: &Prepared,
+    shape: Shape<'_>,
+) -> Option<Fit> {
+    let references = prepared.references();
+    let data = Data {
+        factory: input.factory,
+        views: &references,
+        pictures: &prepared.pictures,
+        loss: LOSS,
+    };
+    let poses: Vec<_> = prepared.views.iter().map(|v| v.pose).collect();
+    fit(shape, &data, &shape.start(input.factory), &poses)
+}
+
+/// A fit to every other view, beginning with `first`; `None` where these do not determine the focal length.
+pub(super) fn half_focal_px(
+    input: &Input<'_>,
+    prepared: &Prepared,
+    shape: Shape<'_>,
+    whole: &Fit,
+    first: usize,
+) -> Option<Estimate> {
+    let half: Vec<&Measured> = prepared.views.iter().skip(first).step_by(2).collect();
+    let poses: Vec<_> = whole.poses.iter().copied().skip(first).step_by(2).collect();
+    let pictures = views::pictures(&half, input.factory.width);
+    let data = Data { factory: input.factory, views: &half, pictures: &pictures, loss: LOSS };
+    if data.n_pictures() < MIN_PICTURES {
+        return None;
+    }
+    let focal = fit(shape, &data, &whole.free, &poses)?.focal_px();
+    (focal.sigma <= MAX_FOCAL_SIGMA * focal.value).then_some(focal)
+}
+
+/// All models that the views determine, and the one chosen.
+///
+/// A model is judged by the pictures it was not fitted to: intrinsics from all other pictures, the six numbers of
+/// each pose from the picture itself. The pose is fitted to *all* its corners, not to some to predict the rest: every
+/// model has the same six, so that they favour none, and no corner is lost to the judgement. What remains is, but for
+/// noise, how far the intrinsics are from those the picture itself would ask for, weighed by what it can know.
+///
+/// One-standard-error rule (Breiman et al. 1984): the simplest model whose held-out mean square is within one
+/// standard error of the best one's; the error is that of the *difference*, picture by picture, in which what is
+/// common to both models (blur, a wavy board) cancels.
+pub(super) fn choose(
+    input: &Input<'_>,
+    prepared: &Prepared,
+) -> Result<(Model, Vec<(Candidate, Fit)>), Error> {
+    let fits: Vec<(Model, Fit)> = Model::ALL
+        .into_iter()
+        .filter_map(|model| {
+            let fit = fit_prepared(input, prepared, model.shape(input.tables)?)?;
+            let focal = fit.focal_px();
+            (focal.sigma <= MAX_FOCAL_SIGMA * focal.value).then_some((model, fit))
+        })
+        .collect();
+    let score = |fit: &Fit| mean(&fit.held_out);
+    let Some((_, best)) = fits.iter().min_by(|(_, a), (_, b)| score(a).total_cmp(&score(b))) else {
+        return Err(underdetermined(prepared, None));
+    };
+    let behind: Vec<f64> = fits.iter().map(|(_, fit)| behind_sigmas(fit, best)).collect();
+    let chosen = behind.iter().position(|b| *b <= 1.0).unwrap_or(0);
+    let model = fits[chosen].0;
+    let candidates = fits
+        .iter()
+        .zip(behind)
+        .map(|((model, fit), behind_best_sigmas)| {
+            let candidate = Candidate {
+                model: *model,
+                rms_px: rms_px(input, prepared, *model, fit),
+                held_out_rms_px: prepared.held_out_rms_px(fit),
+                behind_best_sigmas,
+                focal_px: fit.focal_px(),
+            };
+            (candidate, fit.clone())
+        })
+        .collect();
+    Ok((model, candidates))
+}
+
+/// By how many standard errors of the difference `fit` predicts worse than `best`.
+pub(super) fn behind_sigmas(fit: &Fit, best: &Fit) -> f64 {
+    let differences: Vec<f64> =
+        fit.held_out.iter().zip(&best.held_out).map(|(a, b)| a - b).collect();
+    let behind = mean(&differences);
+    if behind == 0.0 {
+        return 0.0;
+    }
+    behind / standard_error(&differences)
+}
+
+pub(super) fn underdetermined(prepared: &Prepared, focal_px: Option<Estimate>) -> Error {
+    Error::Underdetermined {
+        n_views: prepared.views.len(),
+        n_pictures: prepared.n_pictures(),
+        max_tilt_deg: views::max_tilt_deg(prepared.views.iter().map(|v| &v.pose)),
+        focal_px,
+    }
+}
+
+fn rms_px(input: &Input<'_>, prepared: &Prepared, model: Model, fit: &Fit) -> f64 {
+    match model.shape(input.tables) {
+        Some(shape) => shape_rms_px(input, prepared, shape, fit),
+        None => f64::NAN,
+    }
+}
+
+/// The RMS of 2-D distances under a fit, all corners alike.
+pub(super) fn shape_rms_px(
+    input: &Input<'_>,
+    prepared: &Prepared,
+    shape: Shape<'_>,
+    fit: &Fit,
+) -> f64 {
+    let camera = shape.camera(input.factory, input.tables, &fit.free);
+    let (mut squares, mut n) = (0.0, 0);
+    for (view, pose) in prepared.views.iter().zip(&fit.poses) {
+        for (corner, point) in view.corners.iter().zip(&view.points) {
+            let pixel = camera.project(*pose * Point::from_coords(*point));
+            squares += pixel.map_or(f64::INFINITY, |p| corner.pixel.distance(p).powi(2));
+            n += 1;
+        }
+    }
+    (squares / f64::from(n)).sqrt()
+}

@@ -1,0 +1,106 @@
+//! How much of the lens' distortion is left in the stream.
+
+use super::{
+    DistortionTest, Estimate, Hypothesis, Input, Lens,
+    auto::{Prepared, behind_sigmas, fit_prepared, shape_rms_px},
+    fit::Fit,
+    model::{Center, Shape, Warp, brown},
+};
+use crate::camera::{Intrinsics, RadialTable, TablePair};
+
+/// Fits every hypothesis; `None` where the views do not determine k1.
+pub(super) fn test(input: &Input<'_>, prepared: &Prepared) -> Option<DistortionTest> {
+    let mut hypotheses = Vec::new();
+    let mut add = |lens: Lens, warp: Warp<'_>| -> Option<Fit> {
+        let shape = Shape { center: Center::Free, warp };
+        let fit = fit_prepared(input, prepared, shape).filter(|fit| fit.covariance.is_some())?;
+        hypotheses.push(Hypothesis {
+            lens,
+            rms_px: shape_rms_px(input, prepared, shape, &fit),
+            held_out_rms_px: prepared.held_out_rms_px(&fit),
+            focal_px: fit.focal_px(),
+        });
+        Some(fit)
+    };
+    add(Lens::None, Warp::None);
+    let mut by_table = None;
+    if let Some(TablePair { forward, inverse }) = input.tables {
+        add(Lens::InverseTable, Warp::Table(inverse));
+        add(Lens::ForwardTable, Warp::Table(forward));
+        by_table = add(Lens::FreeTable, Warp::FreeTable(inverse)).map(|fit| (fit, inverse));
+    }
+    let one = Shape { center: Center::Free, warp: Warp::FreeRadial1 };
+    let two = Shape { center: Center::Free, warp: Warp::FreeRadial2 };
+    let fit_one = fit_prepared(input, prepared, one).filter(|fit| fit.covariance.is_some())?;
+    let fit_two = fit_prepared(input, prepared, two)
+        .filter(|fit| fit.covariance.is_some() && behind_sigmas(&fit_one, fit) > 1.0);
+    let radial = if fit_two.is_some() { two.warp } else { one.warp };
+    let by_radial = add(Lens::FreeRadial, radial)?;
+
+    let corner_shift_px = match &by_table {
+        Some((fit, table)) => propagate(fit, |free| Some(table_shift_px(table, free[3]))),
+        None => propagate(&by_radial, |free| radial_shift_px(input.factory, free)),
+    };
+    Some(DistortionTest {
+        amplitude: by_table.as_ref().map(|(fit, _)| fit.estimate(3)),
+        k1: by_radial.estimate(3),
+        k2: fit_two.is_some().then(|| by_radial.estimate(4)),
+        corner_shift_px,
+        table_corner_shift_px: input.tables.map(|tables| table_shift_px(&tables.inverse, 1.0)),
+        hypotheses,
+    })
+}
+
+/// How far the farthest corner lies outside its rectilinear place: r − (1 + a·m(r))·r.
+fn table_shift_px(table: &RadialTable, amplitude: f64) -> f64 {
+    -amplitude * table.magnification_at(table.max_radius_px) * table.max_radius_px
+}
+
+/// The same with Brown's polynomial; `None` where it folds before the corner.
+fn radial_shift_px(factory: &Intrinsics, free: &[f64]) -> Option<f64> {
+    let shape = Shape { center: Center::Free, warp: Warp::None };
+    let pinhole = shape.intrinsics(factory, free);
+    let edge = |c: f64, size: usize| {
+        let last = size as f64 - 0.5;
+        if c + 0.5 > last - c { -0.5 - c } else { last - c }
+    };
+    let corner = [
+        edge(pinhole.cx, pinhole.width) / pinhole.fx,
+        edge(pinhole.cy, pinhole.height) / pinhole.fy,
+    ];
+    let straight = brown(&free[3..]).undistort(corner)?;
+    let length = |ray: [f64; 2]| (ray[0] * pinhole.fx).hypot(ray[1] * pinhole.fy);
+    Some(length(corner) - length(straight))
+}
+
+/// A function of the free numbers, with the σ that their covariance gives it to first order. NaN and infinite where
+/// the function has no value.
+fn propagate(fit: &Fit, function: impl Fn(&[f64]) -> Option<f64>) -> Estimate {
+    let n = fit.free.len();
+    let value = function(&fit.free).unwrap_or(f64::NAN);
+    let slope: Vec<f64> = (0..n)
+        .map(|i| {
+            // Half a σ to both sides.
+            let step = 0.5 * fit.estimate(i).sigma;
+            let at = |h: f64| {
+                let mut moved = fit.free.clone();
+                moved[i] += h;
+                function(&moved)
+            };
+            match (at(step), at(-step)) {
+                (Some(high), Some(low)) if step > 0.0 => (high - low) / (2.0 * step),
+                _ => f64::NAN,
+            }
+        })
+        .collect();
+    let mut variance = 0.0;
+    if let Some(covariance) = &fit.covariance {
+        for i in 0..n {
+            for j in 0..n {
+                variance += slope[i] * covariance[i * n + j] * slope[j];
+            }
+        }
+    }
+    let sigma = if variance.is_finite() { variance.max(0.0).sqrt() } else { f64::INFINITY };
+    Estimate { value, sigma }
+}

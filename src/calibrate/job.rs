@@ -1,0 +1,165 @@
+//! The calibration itself.
+
+use super::{
+    Calibration, Candidate, Error, Input, Method, Model, Parameter,
+    auto::{self, MAX_FOCAL_SIGMA, MIN_PICTURES, Prepared},
+    distortion,
+    fit::{Data, Fit, fit},
+    model::Shape,
+    problem::Measured,
+    views,
+};
+use crate::{pose::View, solve::Loss};
+
+/// The intrinsics that explain these corners.
+///
+/// The same input gives the same bytes; the order of `input.frames` matters to [`Method::Paper`] alone, whose choice
+/// of views depends on it. 50 views with 60 corners each take some milliseconds ([`Method::Plain`]) to some tens of
+/// milliseconds ([`Method::Auto`]).
+///
+/// Errors: too few usable views; views that do not determine the focal length to within 3 % (all straight on, or all
+/// the same); a model that needs tables without tables; factory intrinsics that make no camera.
+pub fn calibrate(input: &Input<'_>, method: Method) -> Result<Calibration, Error> {
+    let factory = input.factory;
+    let positive = |f: f64| f > 0.0 && f.is_finite();
+    if !(positive(factory.fx)
+        && positive(factory.fy)
+        && factory.cx.is_finite()
+        && factory.cy.is_finite())
+    {
+        return Err(Error::Factory {
+            fx_px: factory.fx,
+            fy_px: factory.fy,
+            cx_px: factory.cx,
+            cy_px: factory.cy,
+        });
+    }
+    match method {
+        Method::Paper => {
+            let gathered = views::as_the_paper(input);
+            views::require(input, &gathered, 3, views::paper_min_corners())?;
+            plain(input, method, Model::Focal, gathered)
+        }
+        Method::Plain(model) => {
+            let weighting = crate::pose::Weighting::Equal;
+            let gathered = views::all_usable(input, 4, weighting);
+            views::require(input, &gathered, 3, 4)?;
+            plain(input, method, model, gathered)
+        }
+        Method::Robust(model) => {
+            let shape = model.shape(input.tables).ok_or(Error::NoTables { model })?;
+            let prepared = auto::prepare(input)?;
+            let fit = auto::fit_prepared(input, &prepared, shape)
+                .ok_or_else(|| auto::underdetermined(&prepared, None))?;
+            robust(input, method, model, prepared, &fit, Vec::new())
+        }
+        Method::Auto => {
+            let prepared = auto::prepare(input)?;
+            let (model, mut found) = auto::choose(input, &prepared)?;
+            let at = found.iter().position(|(c, _)| c.model == model).unwrap_or(0);
+            let fit = found[at].1.clone();
+            let candidates = found.drain(..).map(|(candidate, _)| candidate).collect();
+            robust(input, method, model, prepared, &fit, candidates)
+        }
+    }
+}
+
+/// All views and corners alike, no loss.
+fn plain(
+    input: &Input<'_>,
+    method: Method,
+    model: Model,
+    views::Gathered { views, rejected }: views::Gathered,
+) -> Result<Calibration, Error> {
+    let shape = model.shape(input.tables).ok_or(Error::NoTables { model })?;
+    let references: Vec<&Measured> = views.iter().collect();
+    let pictures = views::pictures(&references, input.factory.width);
+    let data = Data {
+        factory: input.factory,
+        views: &references,
+        pictures: &pictures,
+        loss: Loss::Squared,
+    };
+    let poses: Vec<_> = views.iter().map(|v| v.pose).collect();
+    let fit = fit(shape, &data, &shape.start(input.factory), &poses);
+    let prepared = Prepared { views, outliers: Vec::new(), rejected, pictures };
+    let fit = fit.ok_or_else(|| auto::underdetermined(&prepared, None))?;
+    let result = Parts { method, model, shape, candidates: Vec::new() };
+    assemble(input, result, prepared, &fit)
+}
+
+fn robust(
+    input: &Input<'_>,
+    method: Method,
+    model: Model,
+    prepared: Prepared,
+    fit: &Fit,
+    candidates: Vec<Candidate>,
+) -> Result<Calibration, Error> {
+    let shape = model.shape(input.tables).ok_or(Error::NoTables { model })?;
+    let halves = [0, 1].map(|first| auto::half_focal_px(input, &prepared, shape, fit, first));
+    let distortion = distortion::test(input, &prepared);
+    let parts = Parts { method, model, shape, candidates };
+    let mut calibration = assemble(input, parts, prepared, fit)?;
+    calibration.split_half_focal_px = match halves {
+        [Some(a), Some(b)] => Some([a, b]),
+        _ => None,
+    };
+    calibration.distortion = distortion;
+    Ok(calibration)
+}
+
+struct Parts<'a> {
+    method: Method,
+    model: Model,
+    shape: Shape<'a>,
+    candidates: Vec<Candidate>,
+}
+
+fn assemble(
+    input: &Input<'_>,
+    Parts { method, model, shape, candidates }: Parts<'_>,
+    prepared: Prepared,
+    fit: &Fit,
+) -> Result<Calibration, Error> {
+    let focal = fit.focal_px();
+    let n_pictures = prepared.n_pictures();
+    // Few pictures cannot contradict each other: their σ would be a guess, and usually far too small.
+    let enough = n_pictures >= MIN_PICTURES && focal.sigma <= MAX_FOCAL_SIGMA * focal.value;
+    let undetermined = || {
+        let known = (n_pictures >= MIN_PICTURES && focal.sigma.is_finite()).then_some(focal);
+        auto::underdetermined(&prepared, known)
+    };
+    let covariance = fit.covariance.clone().filter(|_| enough).ok_or_else(undetermined)?;
+    let camera = shape.camera(input.factory, input.tables, &fit.free);
+    let mut views = Vec::with_capacity(prepared.views.len());
+    let (mut squares, mut n_corners) = (0.0, 0);
+    for (view, pose) in prepared.views.iter().zip(&fit.poses) {
+        let view = View::at_pose(view.frame, input.board, &camera, &view.corners, *pose)
+            .map_err(|_| undetermined())?;
+        squares += view.rms_px * view.rms_px * view.corners.len() as f64;
+        n_corners += view.corners.len();
+        views.push(view);
+    }
+    let parameters = shape
+        .names()
+        .into_iter()
+        .enumerate()
+        .map(|(i, name)| Parameter { name, estimate: fit.estimate(i) })
+        .collect();
+    Ok(Calibration {
+        method,
+        model,
+        camera,
+        parameters,
+        covariance,
+        views,
+        n_pictures,
+        rms_px: (squares / n_corners as f64).sqrt(),
+        candidates,
+        split_half_focal_px: None,
+        distortion: None,
+        outliers: prepared.outliers,
+        rejected: prepared.rejected,
+    })
+}

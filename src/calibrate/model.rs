@@ -1,0 +1,160 @@
+//! Which parameters are free.
+
+use crate::camera::{Brown, Camera, Distortion, Intrinsics, RadialTable, TablePair};
+
+/// Which parameters are free. In order of preference: where two predict equally well, the first is taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Model {
+    /// One focal length; principal point as the factory says, no distortion.
+    Focal,
+    /// As `Focal`, corners first taken through Apple's inverse table.
+    FocalTable,
+    /// One focal length and the principal point.
+    FocalCentre,
+    /// As `FocalCentre`, corners first taken through Apple's inverse table.
+    FocalTableCentre,
+    /// One focal length, principal point, k1 k2 p1 p2 k3.
+    Brown,
+}
+
+impl Model {
+    /// All of them, simplest first.
+    pub const ALL: [Self; 5] =
+        [Self::Focal, Self::FocalTable, Self::FocalCentre, Self::FocalTableCentre, Self::Brown];
+
+    /// `focal`, `focal+table`, `focal+centre`, `focal+table+centre`, `brown`: stable, for people and machines.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Focal => "focal",
+            Self::FocalTable => "focal+table",
+            Self::FocalCentre => "focal+centre",
+            Self::FocalTableCentre => "focal+table+centre",
+            Self::Brown => "brown",
+        }
+    }
+
+    /// True where it applies Apple's inverse table.
+    pub const fn uses_table(self) -> bool {
+        matches!(self, Self::FocalTable | Self::FocalTableCentre)
+    }
+
+    /// Its shape; `None` where it needs a table and there is none.
+    pub(super) fn shape(self, tables: Option<&TablePair>) -> Option<Shape<'_>> {
+        Some(match self {
+            Self::Focal => Shape { center: Center::Fixed, warp: Warp::None },
+            Self::FocalCentre => Shape { center: Center::Free, warp: Warp::None },
+            Self::FocalTable => {
+                Shape { center: Center::Fixed, warp: Warp::Table(&tables?.inverse) }
+            }
+            Self::FocalTableCentre => {
+                Shape { center: Center::Free, warp: Warp::Table(&tables?.inverse) }
+            }
+            Self::Brown => Shape { center: Center::Free, warp: Warp::FreeBrown },
+        })
+    }
+}
+
+/// Is the principal point free?
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Center {
+    Fixed,
+    Free,
+}
+
+/// What lies between the stream and a pinhole.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Warp<'a> {
+    None,
+    /// This table takes the stream to a pinhole's image.
+    Table(&'a RadialTable),
+    /// A free share of it does.
+    FreeTable(&'a RadialTable),
+    /// k1
+    FreeRadial1,
+    /// k1 k2
+    FreeRadial2,
+    /// k1 k2 p1 p2 k3
+    FreeBrown,
+}
+
+/// A camera with some of its numbers free. The free ones are, in order: focal length along x; principal point x, y
+/// (where free); those of the warp.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Shape<'a> {
+    pub(super) center: Center,
+    pub(super) warp: Warp<'a>,
+}
+
+impl Shape<'_> {
+    /// Names of the free numbers.
+    pub(super) fn names(&self) -> Vec<&'static str> {
+        let mut names = vec!["focal_px"];
+        if self.center == Center::Free {
+            names.extend(["center_x_px", "center_y_px"]);
+        }
+        names.extend(match self.warp {
+            Warp::None | Warp::Table(_) => &[][..],
+            Warp::FreeTable(_) => &["table_amplitude"],
+            Warp::FreeRadial1 => &["k1"],
+            Warp::FreeRadial2 => &["k1", "k2"],
+            Warp::FreeBrown => &["k1", "k2", "p1", "p2", "k3"],
+        });
+        names
+    }
+
+    /// The free numbers of an undistorted camera with these intrinsics.
+    pub(super) fn start(&self, intrinsics: &Intrinsics) -> Vec<f64> {
+        let mut start = vec![intrinsics.fx];
+        if self.center == Center::Free {
+            start.extend([intrinsics.cx, intrinsics.cy]);
+        }
+        start.resize(self.names().len(), 0.0);
+        start
+    }
+
+    /// The intrinsics with these numbers; what is not free is the factory's.
+    pub(super) fn intrinsics(&self, factory: &Intrinsics, free: &[f64]) -> Intrinsics {
+        let [cx, cy] = match self.center {
+            Center::Fixed => [factory.cx, factory.cy],
+            Center::Free => [free[1], free[2]],
+        };
+        Intrinsics { fx: free[0], fy: free[0] * (factory.fy / factory.fx), cx, cy, ..*factory }
+    }
+
+    /// The free numbers of the warp.
+    pub(super) fn warp_numbers<'f>(&self, free: &'f [f64]) -> &'f [f64] {
+        match self.center {
+            Center::Fixed => &free[1..],
+            Center::Free => &free[3..],
+        }
+    }
+
+    /// The camera with these numbers.
+    pub(super) fn camera(
+        &self,
+        factory: &Intrinsics,
+        tables: Option<&TablePair>,
+        free: &[f64],
+    ) -> Camera {
+        let numbers = self.warp_numbers(free);
+        let distortion = match (self.warp, tables) {
+            (Warp::None, _) => Distortion::None,
+            (Warp::Table(table), Some(tables)) if *table == tables.inverse => {
+                Distortion::Table(tables.clone())
+            }
+            (Warp::Table(table), _) => Distortion::Table(TablePair::from_inverse(table.clone())),
+            (Warp::FreeTable(table), _) => {
+                Distortion::Table(TablePair::from_inverse(table.scaled(numbers[0])))
+            }
+            (Warp::FreeRadial1 | Warp::FreeRadial2 | Warp::FreeBrown, _) => {
+                Distortion::Brown(brown(numbers))
+            }
+        };
+        Camera { intrinsics: self.intrinsics(factory, free), distortion }
+    }
+}
+
+/// The first so many of k1 k2 p1 p2 k3, the others zero.
+pub(super) fn brown(numbers: &[f64]) -> Brown {
+    Brown::from_parameters(std::array::from_fn(|i| numbers.get(i).copied().unwrap_or(0.0)))
+}

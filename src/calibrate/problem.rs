@@ -1,0 +1,259 @@
+//! Reprojection as a bordered least-squares problem: intrinsics shared, one pose per view.
+
+use super::model::{Center, Shape, Warp, brown};
+use crate::{
+    camera::{Brown, Intrinsics, RadialTable},
+    detect::Corner,
+    geom::{Board, Color, Pixel, Pose, Vector3},
+    pose,
+    solve::{BlockNormal, Bordered, Loss},
+};
+
+/// One view as the solver sees it.
+#[derive(Clone, Debug)]
+pub(super) struct Measured {
+    pub(super) frame: usize,
+    pub(super) corners: Vec<Corner>,
+    /// Where each corner lies on the board, metres.
+    pub(super) points: Vec<Vector3<f64>>,
+    /// The inverse variance of both its coordinates, 1/px².
+    pub(super) weights: Vec<f64>,
+    /// Where the board stands, as far as known.
+    pub(super) pose: Pose<Color, Board>,
+}
+
+pub(super) struct Reprojection<'a, const S: usize> {
+    pub(super) shape: Shape<'a>,
+    pub(super) factory: &'a Intrinsics,
+    pub(super) views: &'a [&'a Measured],
+    pub(super) loss: Loss,
+}
+
+/// A pixel and its derivatives.
+struct Drawn<const S: usize> {
+    pixel: [f64; 2],
+    by_point: [[f64; 3]; 2],
+    by_shared: [[f64; S]; 2],
+}
+
+/// The camera of one state, ready to project.
+struct Ready<'a> {
+    pinhole: Intrinsics,
+    aspect: f64,
+    center: Center,
+    lens: ReadyLens<'a>,
+}
+
+enum ReadyLens<'a> {
+    None,
+    Table(&'a RadialTable),
+    FreeTable { scaled: RadialTable, whole: &'a RadialTable },
+    Brown(Brown),
+}
+
+impl<'a, const S: usize> Reprojection<'a, S> {
+    fn ready(&self, shared: &[f64; S]) -> Ready<'a> {
+        let numbers = self.shape.warp_numbers(shared);
+        let lens = match self.shape.warp {
+            Warp::None => ReadyLens::None,
+            Warp::Table(table) => ReadyLens::Table(table),
+            Warp::FreeTable(whole) => {
+                ReadyLens::FreeTable { scaled: whole.scaled(numbers[0]), whole }
+            }
+            Warp::FreeRadial1 | Warp::FreeRadial2 | Warp::FreeBrown => {
+                ReadyLens::Brown(brown(numbers))
+            }
+        };
+        Ready {
+            pinhole: self.shape.intrinsics(self.factory, shared),
+            aspect: self.factory.fy / self.factory.fx,
+            center: self.shape.center,
+            lens,
+        }
+    }
+}
+
+impl Ready<'_> {
+    /// Where a point of the camera's frame is drawn; `None` behind the camera and outside the lens' domain.
+    #[inline]
+    fn project<const S: usize>(&self, point: &Vector3<f64>) -> Option<Drawn<S>> {
+        if !(point.z > 0.0) {
+            return None;
+        }
+        let Intrinsics { fx, fy, cx, cy, .. } = self.pinhole;
+        let inverse_z = 1.0 / point.z;
+        let [u, v] = [point.x * inverse_z, point.y * inverse_z];
+        let mut by_shared = [[0.0; S]; 2];
+        // Derivatives by the ray, and those by focal length and centre.
+        let (pixel, [[a, b], [c, d]]) = match &self.lens {
+            ReadyLens::None => {
+                self.by_pinhole(&mut by_shared, [u, v], None);
+                ([fx * u + cx, fy * v + cy], [[fx, 0.0], [0.0, fy]])
+            }
+            ReadyLens::Table(table) => {
+                let straight = Pixel::new(fx * u + cx, fy * v + cy);
+                let (pixel, j) = table.invert_with_jacobian(straight)?;
+                self.by_pinhole(&mut by_shared, [u, v], Some(j));
+                let [[a, b], [c, d]] = j;
+                ([pixel.x, pixel.y], [[a * fx, b * fy], [c * fx, d * fy]])
+            }
+            ReadyLens::FreeTable { scaled, whole } => {
+                let straight = Pixel::new(fx * u + cx, fy * v + cy);
+                let (pixel, j) = scaled.invert_with_jacobian(straight)?;
+                self.by_pinhole(&mut by_shared, [u, v], Some(j));
+                // straight = c + (1 + a·m(r))·(pixel − c) held fixed: J⁻¹·dpixel = −m(r)·(pixel − c)·da.
+                let [[a, b], [c, d]] = j;
+                let [x, y] = pixel - whole.center;
+                let m = whole.magnification_at(x.hypot(y));
+                by_shared[0][S - 1] = -m * (a * x + b * y);
+                by_shared[1][S - 1] = -m * (c * x + d * y);
+                ([pixel.x, pixel.y], [[a * fx, b * fy], [c * fx, d * fy]])
+            }
+            ReadyLens::Brown(brown) => {
+                let distorted @ [x, y] = brown.distort([u, v])?;
+                self.by_pinhole(&mut by_shared, distorted, None);
+                let [k_x, k_y] = brown.d_distorted_d_parameters([u, v]);
+                for (i, (k_x, k_y)) in k_x.into_iter().zip(k_y).take(S - 3).enumerate() {
+                    by_shared[0][3 + i] = fx * k_x;
+                    by_shared[1][3 + i] = fy * k_y;
+                }
+                let [[a, b], [c, d]] = brown.d_distorted_d_ray([u, v]);
+                ([fx * x + cx, fy * y + cy], [[fx * a, fx * b], [fy * c, fy * d]])
+            }
+        };
+        let by_point = [
+            [a * inverse_z, b * inverse_z, -(a * u + b * v) * inverse_z],
+            [c * inverse_z, d * inverse_z, -(c * u + d * v) * inverse_z],
+        ];
+        Some(Drawn { pixel, by_point, by_shared })
+    }
+
+    /// Derivatives by focal length and centre of (fx·x + cx, fy·y + cy), followed by a map with Jacobian `after`.
+    #[inline]
+    fn by_pinhole<const S: usize>(
+        &self,
+        by_shared: &mut [[f64; S]; 2],
+        [x, y]: [f64; 2],
+        after: Option<[[f64; 2]; 2]>,
+    ) {
+        let [[a, b], [c, d]] = after.unwrap_or([[1.0, 0.0], [0.0, 1.0]]);
+        let y = self.aspect * y;
+        by_shared[0][0] = a * x + b * y;
+        by_shared[1][0] = c * x + d * y;
+        if self.center == Center::Free {
+            by_shared[0][1] = a;
+            by_shared[0][2] = b;
+            by_shared[1][1] = c;
+            by_shared[1][2] = d;
+        }
+    }
+}
+
+impl<const S: usize> Bordered<S, 6> for Reprojection<'_, S> {
+    type Block = Pose<Color, Board>;
+
+    fn linearize_block(
+        &self,
+        index: usize,
+        shared: &[f64; S],
+        pose: &Self::Block,
+        normal: &mut BlockNormal<S, 6>,
+    ) -> bool {
+        if !(shared[0] > 0.0) {
+            return false;
+        }
+        let ready = self.ready(shared);
+        let view = self.views[index];
+        let rotation = pose.rotation.matrix();
+        for ((corner, point), &weight) in view.corners.iter().zip(&view.points).zip(&view.weights) {
+            let turned = rotation * point;
+            let Some(drawn) = ready.project::<S>(&(turned + pose.translation)) else {
+                return false;
+            };
+            let [dx, dy] = [corner.pixel.x - drawn.pixel[0], corner.pixel.y - drawn.pixel[1]];
+            let square = weight * (dx * dx + dy * dy);
+            let weight = weight * self.loss.weight(square);
+            normal.add_cost(0.5 * self.loss.rho(square));
+            for (residual, row) in [(dx, 0), (dy, 1)] {
+                let by_pose = pose::d_pixel_d_pose(drawn.by_point[row], &turned);
+                normal.add_row(weight, residual, &drawn.by_shared[row], &by_pose);
+            }
+        }
+        true
+    }
+
+    fn advance_block(&self, pose: &Self::Block, step: &[f64; 6]) -> Self::Block {
+        pose::advance(pose, step)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::Rotation;
+
+    #[test]
+    fn jacobians_match_differences() {
+        let factory =
+            Intrinsics { fx: 436.5, fy: 441.25, cx: 321.6, cy: 238.4, width: 640, height: 480 };
+        let table = (0..42).map(|i| -0.002 + 0.06 * (f64::from(i) / 41.0).powi(3)).collect();
+        let table = RadialTable::new(Pixel::new(324.1, 236.9), 403.0, table).unwrap();
+        check(&factory, Shape { center: Center::Fixed, warp: Warp::None }, [450.0]);
+        check(&factory, Shape { center: Center::Fixed, warp: Warp::Table(&table) }, [450.0]);
+        check(&factory, Shape { center: Center::Free, warp: Warp::None }, [450.0, 318.0, 243.0]);
+        let shape = Shape { center: Center::Free, warp: Warp::Table(&table) };
+        check(&factory, shape, [450.0, 318.0, 243.0]);
+        let shape = Shape { center: Center::Free, warp: Warp::FreeTable(&table) };
+        check(&factory, shape, [450.0, 318.0, 243.0, 0.6]);
+        let shape = Shape { center: Center::Free, warp: Warp::FreeRadial1 };
+        check(&factory, shape, [450.0, 318.0, 243.0, 0.07]);
+        let shape = Shape { center: Center::Free, warp: Warp::FreeRadial2 };
+        check(&factory, shape, [450.0, 318.0, 243.0, 0.07, -0.1]);
+        let shape = Shape { center: Center::Free, warp: Warp::FreeBrown };
+        check(&factory, shape, [450.0, 318.0, 243.0, 0.07, -0.1, 0.001, -0.002, 0.03]);
+    }
+
+    /// Against differences, and against the camera of the same numbers.
+    fn check<const S: usize>(factory: &Intrinsics, shape: Shape<'_>, shared: [f64; S]) {
+        assert_eq!(shape.names().len(), S);
+        let problem = Reprojection { shape, factory, views: &[], loss: Loss::Squared };
+        let camera = shape.camera(factory, None, &shared);
+        let turn = Rotation::from_scaled_axis(Vector3::new(0.4, -0.3, 0.2));
+        for i in 0..40 {
+            let board =
+                Vector3::new(f64::from(i % 8) * 0.03 - 0.1, f64::from(i / 8) * 0.03 - 0.06, 0.0);
+            let point = turn * board + Vector3::new(0.011, 0.007, 0.3);
+            let drawn = problem.ready(&shared).project::<S>(&point).unwrap();
+            let expected = camera.project(crate::geom::Point::from_coords(point)).unwrap();
+            assert!((drawn.pixel[0] - expected.x).hypot(drawn.pixel[1] - expected.y) < 1e-10);
+            for k in 0..S {
+                let h = 1e-6 * shared[k].abs().max(0.1);
+                let [low, high] = [-h, h].map(|h| {
+                    let mut moved = shared;
+                    moved[k] += h;
+                    problem.ready(&moved).project::<S>(&point).unwrap().pixel
+                });
+                for row in 0..2 {
+                    let numeric = (high[row] - low[row]) / (2.0 * h);
+                    let analytic = drawn.by_shared[row][k];
+                    assert!(
+                        (analytic - numeric).abs() < 1e-5 * numeric.abs().max(1.0),
+                        "{shape:?} {k} {row}: {analytic} {numeric}"
+                    );
+                }
+            }
+            for k in 0..3 {
+                let h = 1e-8;
+                let [low, high] = [-h, h].map(|h| {
+                    let mut moved = point;
+                    moved[k] += h;
+                    problem.ready(&shared).project::<S>(&moved).unwrap().pixel
+                });
+                for row in 0..2 {
+                    let numeric = (high[row] - low[row]) / (2.0 * h);
+                    assert!((drawn.by_point[row][k] - numeric).abs() < 1e-2, "{shape:?} {k} {row}");
+                }
+            }
+        }
+    }
+}

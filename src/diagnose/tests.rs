@@ -1,0 +1,290 @@
+//! The checks on synthetic corners and depth with one thing wrong at a time, by way of a camera given from outside.
+
+use std::sync::LazyLock;
+
+use super::{Case, Code, Correction, DistortionState, Finding, Tolerances, Verdict, diagnose};
+use crate::{
+    board::{CharucoBoard, Layout},
+    camera::{Camera, Distortion, Intrinsics, RadialTable, TablePair},
+    depth::{BoardDepth, against_board},
+    detect::{Corner, Identity, Observation},
+    geom::{Board, Color, Pixel, Pose, Rotation, Vector3},
+    pose::{View, Weighting},
+    recording::{Factory, Problem},
+};
+
+static BOARD: LazyLock<CharucoBoard> = LazyLock::new(|| CharucoBoard::paper(0.020875).unwrap());
+
+struct Noise(u64);
+
+impl Noise {
+    fn uniform(&mut self) -> f64 {
+        self.0 =
+            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+    }
+}
+
+fn pinhole(focal_px: f64) -> Intrinsics {
+    Intrinsics { fx: focal_px, fy: focal_px, cx: 318.9, cy: 239.8, width: 640, height: 480 }
+}
+
+/// Like the iPad's: 4 px at the corner.
+fn tables() -> TablePair {
+    let table = (0..42).map(|i| -0.01 * (f64::from(i) / 41.0).powi(2)).collect();
+    TablePair::from_inverse(RadialTable::new(Pixel::new(318.9, 239.8), 400.0, table).unwrap())
+}
+
+/// A recording with known truth.
+struct World {
+    /// The camera that drew the images.
+    truth: Camera,
+    /// Sensor = scale · depth + bias.
+    scale: f64,
+    bias_m: f64,
+    /// Smallest and largest distance of the board, metres.
+    range_m: [f64; 2],
+    mirrored: bool,
+    factory: Factory,
+    /// Taken as exact.
+    own: Option<Camera>,
+    problems: Vec<Problem>,
+}
+
+impl World {
+    fn true_one() -> Self {
+        let camera = Camera { intrinsics: pinhole(596.0), distortion: Distortion::None };
+        let mut factory = Factory::pinhole(pinhole(596.0));
+        factory.tables = Some(tables());
+        factory.distortion_center = Some(Pixel::new(318.9, 239.8));
+        Self {
+            own: Some(camera.clone()),
+            truth: camera,
+            scale: 1.0,
+            bias_m: 0.0,
+            range_m: [0.2, 0.45],
+            mirrored: false,
+            factory,
+            problems: Vec::new(),
+        }
+    }
+
+    fn judge(&self) -> (Vec<Finding>, DistortionState) {
+        let mut noise = Noise(11);
+        let mut observations = Vec::new();
+        let mut factory_views = Vec::new();
+        let mut own_views = Vec::new();
+        let mut sensed = Vec::new();
+        let straight = Camera { intrinsics: self.factory.intrinsics, distortion: Distortion::None };
+        for frame in 0..20 {
+            let axis = Vector3::new(noise.normal(), noise.normal(), 0.0).normalize();
+            let rotation = Rotation::from_scaled_axis(axis * (0.3 + 0.4 * noise.uniform()));
+            let [near, far] = self.range_m;
+            let distance_m = near + (far - near) * noise.uniform();
+            let target = Vector3::new(0.04 * noise.normal(), 0.03 * noise.normal(), distance_m);
+            let centre = Vector3::new(0.104, 0.0835, 0.0);
+            let pose: Pose<Color, Board> = Pose::new(rotation, target - rotation * centre);
+            let mut corners = Vec::new();
+            let mut depths = Vec::new();
+            for id in 0..BOARD.n_corners() {
+                let point = pose * BOARD.corner(id);
+                let Some(pixel) = self.truth.project(point) else { continue };
+                let pixel =
+                    Pixel::new(pixel.x + 0.05 * noise.normal(), pixel.y + 0.05 * noise.normal());
+                if (0.0..639.0).contains(&pixel.x) && (0.0..479.0).contains(&pixel.y) {
+                    corners.push(Corner { id, pixel, sigma_px: 0.05 });
+                    depths
+                        .push(Some(self.scale * point.z() + self.bias_m + 0.0005 * noise.normal()));
+                }
+            }
+            let fit = |camera| {
+                View::from_corners(frame, &BOARD, camera, &corners, Weighting::Equal).unwrap()
+            };
+            factory_views.push(fit(&straight));
+            own_views.extend(self.own.as_ref().map(fit));
+            sensed.push(depths);
+            let identity = Identity {
+                layout: Layout::Legacy,
+                mirrored: self.mirrored,
+                inverted: false,
+                n_markers: 10,
+                margin: 50.0,
+            };
+            observations.push(Observation {
+                corners,
+                identity: Some(identity),
+                rejects: Vec::new(),
+            });
+        }
+        let compare = |views: &[View]| -> BoardDepth {
+            let pairs: Vec<_> = views.iter().zip(&sensed).map(|(v, s)| (v, s.as_slice())).collect();
+            against_board(&BOARD, &pairs)
+        };
+        let factory_depth = compare(&factory_views);
+        let own_depth = self.own.is_some().then(|| compare(&own_views));
+        diagnose(&Case {
+            problems: &self.problems,
+            n_frames: observations.len(),
+            size_px: Some([640, 480]),
+            factory: Some(&self.factory),
+            board: &BOARD,
+            observations: &observations.iter().collect::<Vec<_>>(),
+            calibration: None,
+            no_calibration: None,
+            camera: self.own.as_ref(),
+            factory_views: &factory_views.iter().collect::<Vec<_>>(),
+            own_views: &own_views.iter().collect::<Vec<_>>(),
+            factory_depth: Some(&factory_depth),
+            own_depth: own_depth.as_ref(),
+            tolerances: Tolerances::default(),
+        })
+    }
+
+    fn finding(&self, code: Code) -> Finding {
+        self.judge().0.into_iter().find(|f| f.code == code).unwrap()
+    }
+
+    /// Codes of the faults.
+    fn faults(&self) -> Vec<Code> {
+        self.judge().0.iter().filter(|f| f.verdict == Verdict::Fault).map(|f| f.code).collect()
+    }
+}
+
+#[test]
+fn a_true_recording_has_no_fault() {
+    let (findings, state) = World::true_one().judge();
+    assert_eq!(findings.iter().map(|f| f.code).collect::<Vec<_>>(), Code::ALL);
+    assert_eq!(state, DistortionState::Rectified);
+    for finding in &findings {
+        assert!(matches!(finding.verdict, Verdict::Ok | Verdict::Info), "{finding:?}");
+        assert!(!finding.summary.is_empty() && finding.summary.ends_with('.'), "{finding:?}");
+        assert!(finding.correction.is_none(), "{finding:?}");
+    }
+}
+
+#[test]
+fn a_wrong_focal_length_is_one_fault_and_no_other() {
+    let mut world = World::true_one();
+    world.factory.intrinsics = pinhole(596.0 * 1.06);
+    assert_eq!(world.faults(), [Code::TD201]);
+    let finding = world.finding(Code::TD201);
+    assert!((finding.value.unwrap() - 100.0 * (1.0 / 1.06 - 1.0)).abs() < 1e-9);
+    let Some(Correction::Focal { focal_px }) = finding.correction else { panic!() };
+    assert!((focal_px - 596.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_distorted_stream() {
+    let mut world = World::true_one();
+    world.truth.distortion = Distortion::Table(tables());
+    // Whether the own camera knows of it or not.
+    for distortion in [Distortion::None, world.truth.distortion.clone()] {
+        world.own = Some(Camera { intrinsics: pinhole(596.0), distortion });
+        assert_eq!(world.faults(), [Code::TD203]);
+        let (findings, state) = world.judge();
+        assert_eq!(state, DistortionState::Distorted);
+        let finding = findings.iter().find(|f| f.code == Code::TD203).unwrap();
+        // 4 px along the diagonal at the corner.
+        assert!((finding.value.unwrap() - 4.0).abs() < 0.15, "{finding:?}");
+        assert!(matches!(finding.correction, Some(Correction::Undistort { tables: Some(_) })));
+    }
+}
+
+#[test]
+fn rectified_twice() {
+    let mut world = World::true_one();
+    // The lens bends the other way.
+    let table = tables();
+    let swapped = RadialTable::new(
+        table.inverse.center,
+        table.inverse.max_radius_px,
+        table.inverse.magnification.iter().map(|m| -m).collect(),
+    )
+    .unwrap();
+    world.truth.distortion = Distortion::Table(TablePair::from_inverse(swapped));
+    let (_, state) = world.judge();
+    assert_eq!(state, DistortionState::RectifiedTwice);
+    assert_eq!(world.finding(Code::TD203).verdict, Verdict::Fault);
+}
+
+#[test]
+fn depth_faults() {
+    let mut world = World::true_one();
+    world.scale = 0.97;
+    assert_eq!(world.faults(), [Code::TD301]);
+    let finding = world.finding(Code::TD301);
+    assert!((finding.value.unwrap() + 3.0).abs() < 3.0 * finding.sigma.unwrap(), "{finding:?}");
+
+    let mut world = World::true_one();
+    world.bias_m = 0.006;
+    assert_eq!(world.faults(), [Code::TD302]);
+    let finding = world.finding(Code::TD302);
+    assert!((finding.value.unwrap() - 6.0).abs() < 3.0 * finding.sigma.unwrap(), "{finding:?}");
+}
+
+/// A focal length that nobody knows must not become the sensor's fault.
+#[test]
+fn no_camera_no_verdict_on_depth() {
+    let mut world = World::true_one();
+    world.factory.intrinsics = pinhole(596.0 * 1.06);
+    world.own = None;
+    assert_eq!(world.faults(), []);
+    for code in [Code::TD201, Code::TD203, Code::TD301, Code::TD302] {
+        let finding = world.finding(code);
+        assert_eq!(finding.verdict, Verdict::Unknown, "{finding:?}");
+        assert!(finding.what_to_do.contains("Record"), "{finding:?}");
+        assert_eq!(finding.value, None);
+    }
+}
+
+/// At one distance a scale cannot be told from a bias, but depth is wrong all the same, once.
+#[test]
+fn one_distance() {
+    let mut world = World::true_one();
+    world.range_m = [0.3, 0.301];
+    world.scale = 0.97;
+    let faults = world.faults();
+    assert_eq!(faults, [Code::TD301]);
+}
+
+#[test]
+fn mirrored() {
+    let mut world = World::true_one();
+    world.mirrored = true;
+    assert_eq!(world.faults(), [Code::TD403]);
+    assert_eq!(world.finding(Code::TD403).correction, Some(Correction::Unmirror));
+}
+
+#[test]
+fn intrinsics_left_at_the_reference_size() {
+    let mut world = World::true_one();
+    let k = pinhole(596.0);
+    let by = 3088.0 / 640.0;
+    world.factory.intrinsics =
+        Intrinsics { fx: k.fx * by, fy: k.fy * by, cx: k.cx * by, cy: k.cy * by, ..k };
+    world.factory.reference_dimensions = Some([3088.0, 2316.0]);
+    let finding = world.finding(Code::TD503);
+    assert_eq!(finding.verdict, Verdict::Fault);
+    let Some(Correction::ScaleIntrinsics { factor: [x, y] }) = finding.correction else { panic!() };
+    assert!((x * by - 1.0).abs() < 1e-9 && (y * by - 1.0).abs() < 1e-9);
+    assert_eq!(world.finding(Code::TD504).verdict, Verdict::Fault);
+}
+
+#[test]
+fn metadata_facts() {
+    let mut world = World::true_one();
+    world.factory.distortion_center = Some(Pixel::new(318.9, 239.4));
+    world.factory.field_of_view_rad = Some(0.9);
+    world.problems = vec![Problem::MetadataWithoutImages { timestamps: vec![1, 2] }];
+    for (code, value) in [(Code::TD501, 0.4), (Code::TD504, 56.46), (Code::TD101, 1.0)] {
+        let finding = world.finding(code);
+        assert_eq!(finding.verdict, Verdict::Info, "{finding:?}");
+        assert!((finding.value.unwrap() - value).abs() < 0.01, "{finding:?}");
+    }
+    world.problems.push(Problem::ColorWithoutDepth { timestamps: vec![3] });
+    assert_eq!(world.finding(Code::TD101).verdict, Verdict::Warning);
+}
