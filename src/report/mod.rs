@@ -1,1 +1,45 @@
-//! (skeleton)
+//! What leaves the library: JSON, HTML, SVG, and the words for a terminal.
+//!
+//! An [`Audit`](crate::audit::Audit) leaves in three forms that say the same. [`wire`] is the versioned form for
+//! programs, written by [`to_json`]; [`summary`] is what a person reads in ten seconds on a terminal, as lines of
+//! [`Span`]s with a [`Tone`] each; [`page`] is one HTML file with the verdicts first and the evidence behind them,
+//! with a few of the recording's images ([`Photo`]) and what the detector saw in them ([`Overlay`]).
+//!
+//! The page loads nothing from anywhere, and every string that came out of a file is escaped on the way into it.
+//! Nothing here judges: words, numbers and verdicts come from [`diagnose`](crate::diagnose).
+//!
+//! ```
+//! use truedepth::report::Tone;
+//!
+//! # fn show(audit: &truedepth::audit::Audit) {
+//! for line in truedepth::report::summary(audit) {
+//!     for span in line.spans {
+//!         print!("{}", if span.tone == Tone::Bad { span.text.to_uppercase() } else { span.text });
+//!     }
+//!     println!();
+//! }
+//! # }
+//! ```
+//!
+//! Not here: files (callers write what they are given), colours of a terminal, verdicts.
+
+mod error;
+mod figures;
+mod html;
+mod json;
+mod overlay;
+mod photo;
+mod svg;
+mod text;
+pub mod wire;
+mod words;
+
+#[cfg(test)]
+mod sample;
+
+pub use error::Error;
+pub use html::{frames_to_show, page};
+pub use json::to_json;
+pub use overlay::Overlay;
+pub use photo::Photo;
+pub use text::{Line, Span, Tone, summary};

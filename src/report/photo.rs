@@ -1,0 +1,144 @@
+//! A few of the recording's images, small enough to travel inside a page.
+
+use jpeg_encoder::{ColorType, Encoder};
+
+use crate::{
+    image::Rgb,
+    recording::{self, Recording},
+};
+
+/// Images wider than this are made smaller by a whole factor.
+const MAX_WIDTH: usize = 800;
+/// Of 100. Print edges stay clean; a 640x480 image takes some 30 kB.
+const JPEG_QUALITY: u8 = 72;
+
+/// An image of the recording as a JPEG.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Photo {
+    /// Index of the frame in the recording.
+    pub frame: usize,
+    /// Columns and rows of the recording's image; the JPEG may be smaller by a whole factor.
+    pub size_px: (usize, usize),
+    /// The file.
+    pub jpeg: Vec<u8>,
+}
+
+impl Photo {
+    /// Reads the colour image of a frame and makes it small.
+    ///
+    /// Errors: as [`Recording::rgb`].
+    pub fn read(recording: &Recording, frame: usize) -> Result<Self, recording::Error> {
+        Ok(Self::new(frame, &recording.rgb(frame)?))
+    }
+
+    /// The photo of an image. Panics where the image has no pixels.
+    pub fn new(frame: usize, image: &Rgb) -> Self {
+        let small = shrunk(image, image.width().div_ceil(MAX_WIDTH));
+        let mut jpeg = Vec::new();
+        let side = |pixels: usize| {
+            u16::try_from(pixels).expect("a shrunk image is at most 65535 pixels a side")
+        };
+        Encoder::new(&mut jpeg, JPEG_QUALITY)
+            .encode(
+                small.pixels().as_flattened(),
+                side(small.width()),
+                side(small.height()),
+                ColorType::Rgb,
+            )
+            .expect("the number of bytes is right and writing to memory does not fail");
+        Self { frame, size_px: (image.width(), image.height()), jpeg }
+    }
+
+    /// The JPEG as a `data:` address.
+    pub(super) fn data_uri(&self) -> String {
+        format!("data:image/jpeg;base64,{}", base64(&self.jpeg))
+    }
+}
+
+/// The mean of blocks of `factor` × `factor` pixels, incomplete blocks dropped. Values are averaged as stored: for a
+/// thumbnail the difference to linear light cannot be seen.
+fn shrunk(image: &Rgb, factor: usize) -> Rgb {
+    // A very tall image is made smaller by more than its width asks for, down to at least one pixel.
+    let factor = factor.max(image.height().div_ceil(4 * MAX_WIDTH)).max(1);
+    let (width, height) = ((image.width() / factor).max(1), (image.height() / factor).max(1));
+    if factor == 1 {
+        return image.clone();
+    }
+    let mut pixels = Vec::with_capacity(width * height);
+    for y in 0..height {
+        for x in 0..width {
+            let mut sum = [0u32; 3];
+            let mut count = 0;
+            for row in y * factor..((y + 1) * factor).min(image.height()) {
+                let row = &image.pixels()[row * image.width()..][..image.width()];
+                for pixel in &row[x * factor..((x + 1) * factor).min(image.width())] {
+                    for (sum, channel) in sum.iter_mut().zip(pixel) {
+                        *sum += u32::from(*channel);
+                    }
+                    count += 1;
+                }
+            }
+            pixels.push(sum.map(|sum| ((sum + count / 2) / count) as u8));
+        }
+    }
+    Rgb::new(width, height, pixels)
+}
+
+/// RFC 4648, section 4.
+fn base64(bytes: &[u8]) -> String {
+    const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for chunk in bytes.chunks(3) {
+        let bits = chunk
+            .iter()
+            .enumerate()
+            .fold(0u32, |bits, (i, &b)| bits | u32::from(b) << (16 - 8 * i));
+        for sextet in 0..4 {
+            let letter = ALPHABET[(bits >> (18 - 6 * sextet)) as usize & 63];
+            text.push(if sextet <= chunk.len() { char::from(letter) } else { '=' });
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rfc_4648_vectors() {
+        for (plain, coded) in [
+            ("", ""),
+            ("f", "Zg=="),
+            ("fo", "Zm8="),
+            ("foo", "Zm9v"),
+            ("foob", "Zm9vYg=="),
+            ("fooba", "Zm9vYmE="),
+            ("foobar", "Zm9vYmFy"),
+        ] {
+            assert_eq!(base64(plain.as_bytes()), coded);
+        }
+        assert_eq!(base64(&[255, 239, 190]), "/+++");
+    }
+
+    #[test]
+    fn large_images_shrink_by_whole_factors() {
+        let image =
+            Rgb::new(1601, 3, (0..1601 * 3).map(|i| [(i % 1601 / 3 * 3 % 256) as u8; 3]).collect());
+        let small = shrunk(&image, 3);
+        assert_eq!((small.width(), small.height()), (533, 1));
+        assert_eq!(small.pixels()[7], [21; 3]);
+        let photo = Photo::new(4, &image);
+        assert_eq!(photo.size_px, (1601, 3));
+        assert_eq!(&photo.jpeg[..3], &[0xff, 0xd8, 0xff]);
+        assert!(photo.data_uri().starts_with("data:image/jpeg;base64,/9j/"));
+    }
+
+    #[test]
+    fn extreme_shapes() {
+        for (width, height) in [(1, 1), (1, 200_000), (900, 1)] {
+            let photo = Photo::new(0, &Rgb::new(width, height, vec![[9; 3]; width * height]));
+            assert_eq!(photo.size_px, (width, height));
+        }
+    }
+}

@@ -1,0 +1,253 @@
+//! A small audit made by hand for the tests of this room: an iPad whose factory focal length is 6.6 % too long, seen
+//! in twelve frames. All randomness is a fixed sequence.
+
+use super::photo::Photo;
+use crate::{
+    audit::{Audit, FrameAudit, Method},
+    board::{CharucoBoard, Layout},
+    calibrate::{Calibration, Candidate, Estimate, Model, Outlier, Parameter},
+    camera::{Camera, Distortion, Intrinsics},
+    depth::against_board,
+    detect::{Corner, Identity, Observation, Reason, Reject},
+    diagnose::{
+        Code, Correction, Device, DistortionState, Evidence, Finding, Sensor, Unit, Verdict,
+    },
+    geom::{Board, Color, Pixel, Pose, Rotation, Vector3},
+    image::Rgb,
+    pose::View,
+    recording::{Factory, Problem},
+};
+
+const N_FRAMES: usize = 12;
+const FACTORY_FOCAL_PX: f64 = 565.12;
+const OWN_FOCAL_PX: f64 = 530.04;
+
+pub(super) fn audit() -> Audit {
+    let board: CharucoBoard = "10x8:20.875mm:10.4375mm:ARUCO_ORIGINAL".parse().expect("a board");
+    let frames: Vec<FrameAudit> = (0..N_FRAMES).map(|frame| frame_audit(frame, &board)).collect();
+    let depth = |view: fn(&FrameAudit) -> Option<&View>| {
+        let views: Vec<(&View, &[Option<f64>])> =
+            frames.iter().filter_map(|f| Some((view(f)?, f.sensor_m.as_slice()))).collect();
+        against_board(&board, &views)
+    };
+    let mut factory = Factory::pinhole(intrinsics(FACTORY_FOCAL_PX));
+    factory.reference_dimensions = Some([2016.0, 1512.0]);
+    factory.distortion_center = Some(Pixel::new(320.55, 241.09));
+    factory.geometric_distortion_correction = Some(true);
+    factory.depth_filtered = Some(false);
+    factory.depth_absolute = Some(true);
+    factory.device_type = Some("AVCaptureDeviceTypeBuiltInTrueDepthCamera".to_owned());
+    let calibration = calibration(&frames);
+    Audit {
+        name: "iPadPro12_5gen".to_owned(),
+        method: Method::Auto,
+        device: Device {
+            sensor: Sensor::TrueDepth,
+            device_type: factory.device_type.clone(),
+            model: Some("iPad Pro 12.9\" (5th generation)"),
+        },
+        layout: Some(Layout::Legacy),
+        problems: vec![Problem::MetadataWithoutImages { timestamps: vec![100_500, 101_000] }],
+        factory: Some(factory),
+        camera: Some(calibration.camera.clone()),
+        calibration: Some(calibration),
+        no_calibration: None,
+        factory_depth: Some(depth(|f| f.factory_view.as_ref())),
+        own_depth: Some(depth(|f| f.own_view.as_ref())),
+        distortion_state: DistortionState::Rectified,
+        findings: findings(),
+        frames,
+        board,
+    }
+}
+
+/// Grey pictures for the gallery.
+pub(super) fn photos() -> Vec<Photo> {
+    let pixels = (0..64 * 48).map(|i| [(i % 64 * 4) as u8; 3]).collect();
+    let image = Rgb::new(64, 48, pixels);
+    [0, 7].map(|frame| Photo { size_px: (640, 480), ..Photo::new(frame, &image) }).to_vec()
+}
+
+fn intrinsics(focal_px: f64) -> Intrinsics {
+    Intrinsics { fx: focal_px, fy: focal_px, cx: 320.53, cy: 240.68, width: 640, height: 480 }
+}
+
+/// A fixed sequence between −1 and 1 with the mean 0.
+fn wobble(i: usize) -> f64 {
+    let x = (i as f64 * 0.754_877_666).fract() + (i as f64 * 0.569_840_291).fract();
+    x - 1.0
+}
+
+fn frame_audit(frame: usize, board: &CharucoBoard) -> FrameAudit {
+    let at = frame as f64;
+    let own = Camera { intrinsics: intrinsics(OWN_FOCAL_PX), distortion: Distortion::None };
+    let tilt = Vector3::new(0.32 * (1.7 * at).sin(), 0.35 * (2.3 * at).cos(), 0.05 * at);
+    let rotation = Rotation::from_scaled_axis(tilt);
+    let center = rotation * Vector3::new(0.104, 0.083, 0.0);
+    let place = Vector3::new(0.02 * (0.9 * at).sin(), 0.015 * (1.3 * at).cos(), 0.24 + 0.015 * at);
+    let color_from_board: Pose<Color, Board> = Pose::new(rotation, place - center);
+    let mut corners = Vec::new();
+    let mut residuals_px = Vec::new();
+    let mut sensor_m = Vec::new();
+    for id in (0..board.n_corners()).filter(|id| !(id * 7 + frame).is_multiple_of(17)) {
+        let point = color_from_board * board.corner(id);
+        let seed = 2 * (100 * frame + id);
+        let residual = [0.12 * wobble(seed), 0.12 * wobble(seed + 1)];
+        let Some(pixel) = own.project(point) else { continue };
+        let pixel = Pixel::new(pixel.x + residual[0], pixel.y + residual[1]);
+        if !(pixel.x > 2.0 && pixel.y > 2.0 && pixel.x < 637.0 && pixel.y < 477.0) {
+            continue;
+        }
+        corners.push(Corner { id, pixel, sigma_px: 0.06 });
+        residuals_px.push(residual);
+        sensor_m.push(
+            (!(id + frame).is_multiple_of(23))
+                .then(|| point.z() - 0.0005 + 0.0012 * wobble(seed + 7)),
+        );
+    }
+    let rms_px = (residuals_px.iter().map(|[x, y]| x * x + y * y).sum::<f64>()
+        / residuals_px.len() as f64)
+        .sqrt();
+    let own_view = View { frame, corners: corners.clone(), color_from_board, residuals_px, rms_px };
+    // With too long a focal length the board seems farther away by the same factor.
+    let mut farther = color_from_board.translation;
+    farther.z += center.z * (1.0 - FACTORY_FOCAL_PX / OWN_FOCAL_PX);
+    farther.z *= FACTORY_FOCAL_PX / OWN_FOCAL_PX;
+    let factory_view = View {
+        color_from_board: Pose::new(rotation, farther),
+        rms_px: 1.4 * rms_px + 0.1 * wobble(frame).abs(),
+        ..own_view.clone()
+    };
+    let identity = Identity {
+        layout: Layout::Legacy,
+        mirrored: false,
+        inverted: false,
+        n_markers: 38,
+        margin: 410.0,
+    };
+    let rejects =
+        vec![Reject { pixel: Pixel::new(12.0 + 9.0 * at, 33.0), reason: Reason::NoCrossing }];
+    FrameAudit {
+        timestamp: 100_000 + 500 * frame as i64,
+        t_ns: 500_000_000 * frame as i64,
+        color: Some(format!("rgb_{}.png", 100_000 + 500 * frame)),
+        depth: Some(format!("depth_{}.png", 100_000 + 500 * frame)),
+        size_px: Some([640, 480]),
+        observation: Observation { corners, identity: Some(identity), rejects },
+        sensor_m,
+        holes: Some(0.08),
+        factory_view: Some(factory_view),
+        own_view: Some(own_view),
+    }
+}
+
+fn calibration(frames: &[FrameAudit]) -> Calibration {
+    let estimate = |value, sigma| Estimate { value, sigma };
+    let candidate = |model, rms_px, held_out_rms_px, focal_px| Candidate {
+        model,
+        rms_px,
+        held_out_rms_px,
+        focal_px,
+    };
+    Calibration {
+        model: Model::FocalCentre,
+        camera: Camera { intrinsics: intrinsics(OWN_FOCAL_PX), distortion: Distortion::None },
+        parameters: vec![
+            Parameter { name: "focal_px", estimate: estimate(OWN_FOCAL_PX, 0.352) },
+            Parameter { name: "center_x_px", estimate: estimate(320.53, 0.21) },
+            Parameter { name: "center_y_px", estimate: estimate(240.68, 0.26) },
+        ],
+        covariance: vec![0.124, 0.01, -0.02, 0.01, 0.0441, 0.0, -0.02, 0.0, 0.0676],
+        views: frames.iter().filter_map(|f| f.own_view.clone()).collect(),
+        rms_px: 0.0964,
+        candidates: vec![
+            candidate(Model::Focal, 0.121, 0.128, estimate(530.9, 0.41)),
+            candidate(Model::FocalTable, 0.484, 0.491, estimate(536.2, 1.7)),
+            candidate(Model::FocalCentre, 0.0964, 0.1032, estimate(OWN_FOCAL_PX, 0.352)),
+            candidate(Model::Brown, 0.0951, 0.1049, estimate(529.7, 0.48)),
+        ],
+        split_half_focal_px: Some([estimate(529.6, 0.52), estimate(530.4, 0.49)]),
+        outliers: vec![Outlier { frame: 3, id: 61, residual_px: 2.31 }],
+    }
+}
+
+fn findings() -> Vec<Finding> {
+    let base = |code, verdict, unit| Finding {
+        code,
+        verdict,
+        value: None,
+        sigma: None,
+        unit,
+        tolerance: None,
+        summary: String::new(),
+        evidence: Vec::new(),
+        what_to_do: String::new(),
+        correction: None,
+    };
+    vec![
+        Finding {
+            summary: "Two metadata entries have no image; no frame is lost by it.".to_owned(),
+            value: Some(2.0),
+            ..base(Code::TD101, Verdict::Info, Unit::Count)
+        },
+        Finding {
+            value: Some(-6.207),
+            sigma: Some(0.062),
+            tolerance: Some(1.0),
+            summary: "The focal length is 530.0 ± 0.4 px, 6.2 % shorter than the factory's 565.12 px: 100 σ away, 1 % \
+                      would count as true."
+                .to_owned(),
+            evidence: vec![
+                Evidence { name: "factory_focal_px", value: FACTORY_FOCAL_PX, sigma: None },
+                Evidence { name: "focal_px", value: OWN_FOCAL_PX, sigma: Some(0.352) },
+            ],
+            what_to_do: "Use 530.04 px wherever the factory's focal length is used at 640x480.".to_owned(),
+            correction: Some(Correction::Focal { focal_px: OWN_FOCAL_PX }),
+            ..base(Code::TD201, Verdict::Fault, Unit::Percent)
+        },
+        Finding {
+            value: Some(0.11),
+            sigma: Some(0.07),
+            tolerance: Some(1.0),
+            summary: "Straight lines are straight to 0.11 ± 0.07 px at the corner of the image.".to_owned(),
+            ..base(Code::TD203, Verdict::Ok, Unit::Px)
+        },
+        Finding {
+            value: Some(0.3),
+            sigma: Some(0.9),
+            tolerance: Some(1.0),
+            summary: "The depth scale is 1.003 ± 0.009: a fault of 1 % could hide in the uncertainty.".to_owned(),
+            what_to_do: "Record the board at 20, 30 and 40 cm, ten frames each.".to_owned(),
+            ..base(Code::TD301, Verdict::Unknown, Unit::Percent)
+        },
+        Finding {
+            summary: "The principal point and the distortion centre are not the same point, as on all cameras of \
+                      this kind."
+                .to_owned(),
+            value: Some(0.41),
+            ..base(Code::TD501, Verdict::Info, Unit::Px)
+        },
+    ]
+}
+
+pub(super) use golden::assert_golden;
+
+#[cfg(test)]
+mod golden {
+    /// Compares with a file in `golden/`; with `UPDATE_GOLDEN=1` in the environment writes it instead.
+    pub(crate) fn assert_golden(name: &str, text: &str) {
+        let path =
+            std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/report/golden").join(name);
+        if std::env::var_os("UPDATE_GOLDEN").is_some() {
+            std::fs::write(&path, text).expect("the folder is there");
+        }
+        let golden = std::fs::read_to_string(&path).unwrap_or_default();
+        let differing = golden.lines().zip(text.lines()).position(|(old, new)| old != new);
+        assert!(
+            golden == text,
+            "{} differs from line {} on; if that is meant, run with UPDATE_GOLDEN=1",
+            path.display(),
+            differing.unwrap_or(golden.lines().count().min(text.lines().count())) + 1
+        );
+    }
+}

@@ -1,0 +1,413 @@
+//! An audit.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::{Calibration, finite};
+use crate::{
+    audit::{self, FrameAudit},
+    board::{CharucoBoard, Layout},
+    calibrate::Estimate,
+    depth::{BoardDepth, FrameDepth},
+    diagnose::{self, Device, Finding},
+    recording::Factory,
+};
+
+/// Everything that can be known of a recording.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Audit {
+    /// Name of the recording.
+    pub recording: String,
+    /// Version of truedepth.
+    pub version: String,
+    /// The camera.
+    pub device: DeviceInfo,
+    /// The board that was looked for.
+    pub board: Board,
+    /// Frames in the recording.
+    pub n_frames: usize,
+    /// Frames in which the board was seen.
+    pub n_frames_with_board: usize,
+    /// What was odd in the files, in words.
+    pub problems: Vec<String>,
+    /// The own intrinsics; `null` where there are none.
+    pub calibration: Option<Calibration>,
+    /// Why there are none.
+    pub no_calibration: Option<String>,
+    /// Sensor against board; `null` where it could not be compared.
+    pub depth: Option<Depth>,
+    /// Depth against colour.
+    pub alignment: Alignment,
+    /// `rectified`, `distorted`, `rectified_twice` or `unknown`.
+    pub distortion_state: String,
+    /// By code.
+    pub findings: Vec<FindingInfo>,
+    /// In order of time.
+    pub frames: Vec<Frame>,
+}
+
+/// The camera.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DeviceInfo {
+    /// `TrueDepth`, `LiDAR` or `unknown`.
+    pub sensor: String,
+    /// As in the files, e.g. `AVCaptureDeviceTypeBuiltInTrueDepthCamera`.
+    pub device_type: Option<String>,
+    /// Devices known to have this camera, for people.
+    pub model: Option<String>,
+    /// The factory's calibration at the size of the images.
+    pub factory: Option<FactoryInfo>,
+}
+
+/// The factory's calibration at the size of the images.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FactoryInfo {
+    /// The mean of both focal lengths.
+    pub focal_px: f64,
+    /// Principal point.
+    pub principal_point_px: [f64; 2],
+    /// Columns and rows these numbers are for.
+    pub image_size_px: [usize; 2],
+    /// `intrinsicMatrixReferenceDimensions`.
+    pub reference_dimensions_px: Option<[f64; 2]>,
+    /// Lens distortion centre.
+    pub distortion_center_px: Option<[f64; 2]>,
+    /// Whether both distortion tables are there.
+    pub has_tables: bool,
+    /// `GeometricDistortionCorrectionEnabled`.
+    pub geometric_distortion_correction: Option<bool>,
+    /// `isDepthDataFiltered`.
+    pub depth_filtered: Option<bool>,
+    /// `depthDataAccuracy` is absolute.
+    pub depth_absolute: Option<bool>,
+}
+
+/// The board that was looked for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Board {
+    /// Squares along a row.
+    pub squares_x: usize,
+    /// Squares along a column.
+    pub squares_y: usize,
+    /// Side of a square.
+    pub square_m: f64,
+    /// Side of a marker.
+    pub marker_m: f64,
+    /// As OpenCV names it, without `DICT_`.
+    pub dictionary: String,
+    /// `legacy` or `new`, where it was given or seen.
+    pub layout: Option<String>,
+}
+
+/// Sensor against board. Errors are board depth minus sensor depth, as in the paper's code.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Depth {
+    /// Mean over frames of the median error, poses by the factory's intrinsics.
+    pub factory_median_error_mm: Option<f64>,
+    /// Spread of the frames' medians over the root of their number.
+    pub factory_median_error_sigma_mm: Option<f64>,
+    /// As `factory_median_error_mm`, poses by the own camera.
+    pub own_median_error_mm: Option<f64>,
+    /// Spread of the frames' medians over the root of their number.
+    pub own_median_error_sigma_mm: Option<f64>,
+    /// sensor = scale · board + bias, poses by the own camera (by the factory's intrinsics where there is none).
+    pub scale: Option<f64>,
+    /// Standard deviation of `scale`.
+    pub scale_sigma: Option<f64>,
+    /// Where the line meets board = 0.
+    pub bias_mm: Option<f64>,
+    /// Standard deviation of `bias_mm`.
+    pub bias_sigma_mm: Option<f64>,
+    /// Correlation of scale and bias.
+    pub scale_bias_correlation: Option<f64>,
+    /// Smallest and largest depth of the board.
+    pub range_mm: Option<[f64; 2]>,
+    /// Robust standard deviation of the samples about the line.
+    pub residual_mm: Option<f64>,
+    /// Frames with depth and board.
+    pub per_frame: Vec<FrameDepthInfo>,
+}
+
+/// One frame's depth against the board.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FrameDepthInfo {
+    /// Index of the frame in the recording.
+    pub frame: usize,
+    /// With the factory's intrinsics (with the own camera where the factory says nothing).
+    pub median_error_mm: Option<f64>,
+    /// With the own camera.
+    pub own_median_error_mm: Option<f64>,
+    /// Corners that `median_error_mm` is the median of.
+    pub n: usize,
+}
+
+/// Depth against colour; `null` is "not measured".
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Alignment {
+    /// Size of the depth image against the colour image.
+    pub zoom: Option<f64>,
+    /// Standard deviation of `zoom`.
+    pub zoom_sigma: Option<f64>,
+    /// Shift of depth against colour.
+    pub shift_px: Option<[f64; 2]>,
+    /// Whether the images show the board mirrored.
+    pub mirrored: Option<bool>,
+}
+
+/// One thing that was checked.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FindingInfo {
+    /// `TD201` and the like.
+    pub code: String,
+    /// `fault`, `warning`, `info`, `ok` or `unknown`.
+    pub severity: String,
+    /// A few words.
+    pub title: String,
+    /// The deviation, in `unit`.
+    pub value: Option<f64>,
+    /// Its standard deviation.
+    pub sigma: Option<f64>,
+    /// `%`, `px`, `mm`, `deg` or empty.
+    pub unit: String,
+    /// Beyond this a significant deviation is a fault.
+    pub tolerance: Option<f64>,
+    /// One sentence with the numbers and the test.
+    pub summary: String,
+    /// What to do now.
+    pub what_to_do: String,
+    /// What would make the data true.
+    pub correction: Option<CorrectionInfo>,
+    /// The numbers behind it, by name.
+    pub evidence: BTreeMap<String, EvidenceInfo>,
+}
+
+/// A number that speaks for a verdict.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EvidenceInfo {
+    /// The number; its name tells the unit.
+    pub value: Option<f64>,
+    /// Its standard deviation, where it is an estimate.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sigma: Option<f64>,
+}
+
+/// What would make the data true.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CorrectionInfo {
+    /// `focal`, `undistort`, `depth`, `unmirror` or `scale_intrinsics`.
+    pub kind: String,
+    /// Whether images or depth maps change, not only metadata.
+    pub changes_data: bool,
+    /// Its parameters, by name.
+    pub parameters: BTreeMap<String, f64>,
+}
+
+/// One frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Frame {
+    /// Index in the recording.
+    pub frame: usize,
+    /// As written in the file.
+    pub timestamp: i64,
+    /// Since the first frame.
+    pub t_ns: i64,
+    /// Name of the colour image inside the recording.
+    pub color: Option<String>,
+    /// Name of the depth image inside the recording.
+    pub depth: Option<String>,
+    /// Corners found.
+    pub n_corners: usize,
+    /// Candidates not taken.
+    pub n_rejected: usize,
+    /// Of the pose with the factory's intrinsics.
+    pub factory_rms_px: Option<f64>,
+    /// Of the pose with the own camera.
+    pub own_rms_px: Option<f64>,
+    /// Fraction of the depth map without measurement.
+    pub holes: Option<f64>,
+}
+
+impl From<&audit::Audit> for Audit {
+    fn from(audit: &audit::Audit) -> Self {
+        let factory = audit.factory.as_ref();
+        Self {
+            recording: audit.name.clone(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            device: DeviceInfo::new(&audit.device, factory),
+            board: Board::new(&audit.board, audit.layout),
+            n_frames: audit.frames.len(),
+            n_frames_with_board: audit.n_frames_with_board(),
+            problems: audit.problems.iter().map(ToString::to_string).collect(),
+            calibration: audit.calibration.as_ref().map(|calibration| {
+                Calibration::new(&audit.name, audit.method.name(), factory, calibration)
+            }),
+            no_calibration: audit.no_calibration.clone(),
+            depth: Depth::new(audit.factory_depth.as_ref(), audit.own_depth.as_ref()),
+            alignment: Alignment {
+                zoom: None,
+                zoom_sigma: None,
+                shift_px: None,
+                mirrored: mirrored(&audit.frames),
+            },
+            distortion_state: audit.distortion_state.name().to_owned(),
+            findings: audit.findings.iter().map(FindingInfo::from).collect(),
+            frames: audit.frames.iter().enumerate().map(Frame::from).collect(),
+        }
+    }
+}
+
+/// What most views of the board say.
+fn mirrored(frames: &[FrameAudit]) -> Option<bool> {
+    let seen: Vec<bool> = frames
+        .iter()
+        .filter_map(|f| f.observation.identity.as_ref())
+        .map(|identity| identity.mirrored)
+        .collect();
+    let n_mirrored = seen.iter().filter(|&&mirrored| mirrored).count();
+    (!seen.is_empty()).then_some(2 * n_mirrored > seen.len())
+}
+
+impl DeviceInfo {
+    fn new(device: &Device, factory: Option<&Factory>) -> Self {
+        Self {
+            sensor: device.sensor.name().to_owned(),
+            device_type: device.device_type.clone(),
+            model: device.model.map(str::to_owned),
+            factory: factory.map(FactoryInfo::from),
+        }
+    }
+}
+
+impl From<&Factory> for FactoryInfo {
+    fn from(factory: &Factory) -> Self {
+        let intrinsics = &factory.intrinsics;
+        Self {
+            focal_px: intrinsics.focal_px(),
+            principal_point_px: [intrinsics.cx, intrinsics.cy],
+            image_size_px: [intrinsics.width, intrinsics.height],
+            reference_dimensions_px: factory.reference_dimensions,
+            distortion_center_px: factory.distortion_center.map(|center| [center.x, center.y]),
+            has_tables: factory.tables.is_some(),
+            geometric_distortion_correction: factory.geometric_distortion_correction,
+            depth_filtered: factory.depth_filtered,
+            depth_absolute: factory.depth_absolute,
+        }
+    }
+}
+
+impl Board {
+    fn new(board: &CharucoBoard, seen: Option<Layout>) -> Self {
+        Self {
+            squares_x: board.squares_x,
+            squares_y: board.squares_y,
+            square_m: board.square_m,
+            marker_m: board.marker_m,
+            dictionary: board.dictionary.name().to_owned(),
+            layout: seen.or(board.layout).map(|layout| layout.name().to_owned()),
+        }
+    }
+}
+
+impl Depth {
+    fn new(factory: Option<&BoardDepth>, own: Option<&BoardDepth>) -> Option<Self> {
+        let frames = &factory.or(own)?.frames;
+        let error = |depth: Option<&BoardDepth>| depth.and_then(|depth| depth.mean_of_medians_m);
+        let value_mm = |estimate: Option<Estimate>| estimate.and_then(|e| finite(1e3 * e.value));
+        let sigma_mm = |estimate: Option<Estimate>| estimate.and_then(|e| finite(1e3 * e.sigma));
+        let line = own.or(factory).and_then(|depth| depth.line.as_ref());
+        Some(Self {
+            factory_median_error_mm: value_mm(error(factory)),
+            factory_median_error_sigma_mm: sigma_mm(error(factory)),
+            own_median_error_mm: value_mm(error(own)),
+            own_median_error_sigma_mm: sigma_mm(error(own)),
+            scale: line.and_then(|line| finite(line.scale.value)),
+            scale_sigma: line.and_then(|line| finite(line.scale.sigma)),
+            bias_mm: value_mm(line.map(|line| line.bias_m)),
+            bias_sigma_mm: sigma_mm(line.map(|line| line.bias_m)),
+            scale_bias_correlation: line.and_then(|line| finite(line.correlation)),
+            range_mm: line.map(|line| line.range_m.map(|depth_m| 1e3 * depth_m)),
+            residual_mm: line.and_then(|line| finite(1e3 * line.residual_m)),
+            per_frame: frames.iter().map(|frame| FrameDepthInfo::new(frame, own)).collect(),
+        })
+    }
+}
+
+impl FrameDepthInfo {
+    fn new(frame: &FrameDepth, own: Option<&BoardDepth>) -> Self {
+        let mm =
+            |frame: &FrameDepth| frame.median_error_m.and_then(|error_m| finite(1e3 * error_m));
+        let own = own.and_then(|own| own.frames.iter().find(|other| other.frame == frame.frame));
+        Self {
+            frame: frame.frame,
+            median_error_mm: mm(frame),
+            own_median_error_mm: own.and_then(mm),
+            n: frame.kept().count(),
+        }
+    }
+}
+
+impl From<&Finding> for FindingInfo {
+    fn from(finding: &Finding) -> Self {
+        Self {
+            code: finding.code.name().to_owned(),
+            severity: finding.verdict.name().to_owned(),
+            title: finding.title().to_owned(),
+            value: finding.value.and_then(finite),
+            sigma: finding.sigma.and_then(finite),
+            unit: finding.unit.symbol().to_owned(),
+            tolerance: finding.tolerance.and_then(finite),
+            summary: finding.summary.clone(),
+            what_to_do: finding.what_to_do.clone(),
+            correction: finding.correction.as_ref().map(CorrectionInfo::from),
+            evidence: finding
+                .evidence
+                .iter()
+                .map(|e| {
+                    (
+                        e.name.to_owned(),
+                        EvidenceInfo { value: finite(e.value), sigma: e.sigma.and_then(finite) },
+                    )
+                })
+                .collect(),
+        }
+    }
+}
+
+impl From<&diagnose::Correction> for CorrectionInfo {
+    fn from(correction: &diagnose::Correction) -> Self {
+        let parameters: Vec<(&str, f64)> = match correction {
+            diagnose::Correction::Focal { focal_px } => vec![("focal_px", *focal_px)],
+            diagnose::Correction::Depth { scale, bias_m } => {
+                vec![("scale", *scale), ("bias_mm", 1e3 * bias_m)]
+            }
+            diagnose::Correction::ScaleIntrinsics { factor: [x, y] } => {
+                vec![("factor_x", *x), ("factor_y", *y)]
+            }
+            _ => Vec::new(),
+        };
+        let finite = parameters.into_iter().filter(|(_, value)| value.is_finite());
+        Self {
+            kind: correction.name().to_owned(),
+            changes_data: correction.changes_data(),
+            parameters: finite.map(|(name, value)| (name.to_owned(), value)).collect(),
+        }
+    }
+}
+
+impl From<(usize, &FrameAudit)> for Frame {
+    fn from((index, frame): (usize, &FrameAudit)) -> Self {
+        Self {
+            frame: index,
+            timestamp: frame.timestamp,
+            t_ns: frame.t_ns,
+            color: frame.color.clone(),
+            depth: frame.depth.clone(),
+            n_corners: frame.observation.corners.len(),
+            n_rejected: frame.observation.rejects.len(),
+            factory_rms_px: frame.factory_view.as_ref().and_then(|view| finite(view.rms_px)),
+            own_rms_px: frame.own_view.as_ref().and_then(|view| finite(view.rms_px)),
+            holes: frame.holes.and_then(finite),
+        }
+    }
+}

@@ -1,0 +1,303 @@
+//! A calibration, out and in again.
+
+use serde::{Deserialize, Serialize};
+
+use super::{finite, model_name};
+use crate::{
+    calibrate::{self, Estimate},
+    camera::{self, Brown, Camera, Intrinsics, RadialTable, TablePair},
+    geom::Pixel,
+    pose,
+    recording::Factory,
+    report::Error,
+};
+
+/// A calibration.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Calibration {
+    /// Name of the recording.
+    pub recording: String,
+    /// `paper` or `auto`.
+    pub method: String,
+    /// `focal`, `focal+table`, `focal+centre`, `focal+table+centre` or `brown`.
+    pub model: String,
+    /// The mean of both focal lengths.
+    pub focal_px: f64,
+    /// Standard deviation of `focal_px`.
+    pub focal_sigma_px: Option<f64>,
+    /// What the factory says; `null` where the recording does not tell.
+    pub factory_focal_px: Option<f64>,
+    /// (own − factory) / factory.
+    pub focal_difference_percent: Option<f64>,
+    /// Horizontal and vertical focal length.
+    pub focal_xy_px: [f64; 2],
+    /// The centre of projection in the image; integers are pixel centres.
+    pub principal_point_px: [f64; 2],
+    /// Columns and rows of the image that these numbers are for.
+    pub image_size_px: [usize; 2],
+    /// How the lens bends straight lines.
+    pub distortion: Distortion,
+    /// Root mean square of the corners' 2-D distances, as OpenCV counts.
+    pub rms_px: f64,
+    /// Views used.
+    pub n_views: usize,
+    /// Corners used.
+    pub n_corners: usize,
+    /// Focal lengths of two disjoint halves of the views, where there are enough.
+    pub split_half_focal_px: Option<[f64; 2]>,
+    /// Their standard deviations.
+    pub split_half_focal_sigma_px: Option<[Option<f64>; 2]>,
+    /// Free parameters, in the order of `covariance`.
+    pub parameters: Vec<Parameter>,
+    /// Of `parameters`, row by row, poses marginalised.
+    pub covariance: Vec<Vec<Option<f64>>>,
+    /// All models tried, with what they leave unexplained.
+    pub candidates: Vec<Candidate>,
+    /// The views used.
+    pub views: Vec<View>,
+    /// Corners that disagree with all others and were left out.
+    pub outliers: Vec<Outlier>,
+}
+
+/// A free parameter.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Parameter {
+    /// `focal_px`, `center_x_px`, `k1` ...
+    pub name: String,
+    /// Its value.
+    pub value: f64,
+    /// Its standard deviation.
+    pub sigma: Option<f64>,
+}
+
+/// A camera model that was tried.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Candidate {
+    /// As in [`Calibration::model`].
+    pub model: String,
+    /// On the corners it was fitted to.
+    pub rms_px: Option<f64>,
+    /// On corners it had not seen.
+    pub held_out_rms_px: Option<f64>,
+    /// Its focal length.
+    pub focal_px: Option<f64>,
+    /// Standard deviation of `focal_px`.
+    pub focal_sigma_px: Option<f64>,
+}
+
+/// A view of the board: x_camera = R · x_board + t.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct View {
+    /// Index of the frame in the recording.
+    pub frame: usize,
+    /// Corners used.
+    pub n_corners: usize,
+    /// Root mean square of their 2-D distances.
+    pub rms_px: f64,
+    /// Axis times angle of R.
+    pub rotation_vector_rad: [f64; 3],
+    /// t.
+    pub translation_m: [f64; 3],
+}
+
+/// A corner that was left out.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Outlier {
+    /// Index of the frame in the recording.
+    pub frame: usize,
+    /// Id of the corner.
+    pub id: usize,
+    /// Distance to its prediction.
+    pub residual_px: Option<f64>,
+}
+
+/// How the lens bends straight lines.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Distortion {
+    /// Not at all.
+    None,
+    /// Brown-Conrady, OpenCV's five coefficients.
+    Brown {
+        /// r².
+        k1: f64,
+        /// r⁴.
+        k2: f64,
+        /// Tangential.
+        p1: f64,
+        /// Tangential.
+        p2: f64,
+        /// r⁶.
+        k3: f64,
+    },
+    /// Apple's radial tables.
+    Table {
+        /// Rectilinear to distorted, `lensDistortionLookupTable`.
+        forward: Table,
+        /// Distorted to rectilinear, `inverseLensDistortionLookupTable`.
+        inverse: Table,
+    },
+}
+
+/// One radial table: p' = c + (1 + m(|p − c|))·(p − c).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Table {
+    /// c.
+    pub center_px: [f64; 2],
+    /// Radius of the last sample.
+    pub max_radius_px: f64,
+    /// m at evenly spaced radii from 0.
+    pub magnification: Vec<f64>,
+}
+
+impl Calibration {
+    /// What was calibrated from `recording` by `method` (`paper` or `auto`), beside what the factory says.
+    pub fn new(
+        recording: &str,
+        method: &str,
+        factory: Option<&Factory>,
+        calibration: &calibrate::Calibration,
+    ) -> Self {
+        let intrinsics = &calibration.camera.intrinsics;
+        let focal = intrinsics.focal_px();
+        let focal_sigma =
+            calibration.parameters.iter().find(|p| p.name == "focal_px").map(|p| p.estimate.sigma);
+        let factory_focal = factory.map(|f| f.intrinsics.focal_px());
+        let halves = calibration.split_half_focal_px;
+        let n = calibration.parameters.len();
+        Self {
+            recording: recording.to_owned(),
+            method: method.to_owned(),
+            model: model_name(calibration.model).to_owned(),
+            focal_px: focal,
+            focal_sigma_px: focal_sigma.and_then(finite),
+            factory_focal_px: factory_focal,
+            focal_difference_percent: factory_focal
+                .map(|factory| 100.0 * (focal / factory - 1.0))
+                .and_then(finite),
+            focal_xy_px: [intrinsics.fx, intrinsics.fy],
+            principal_point_px: [intrinsics.cx, intrinsics.cy],
+            image_size_px: [intrinsics.width, intrinsics.height],
+            distortion: Distortion::from(&calibration.camera.distortion),
+            rms_px: calibration.rms_px,
+            n_views: calibration.views.len(),
+            n_corners: calibration.views.iter().map(|view| view.corners.len()).sum(),
+            split_half_focal_px: halves.map(|halves| halves.map(|half| half.value)),
+            split_half_focal_sigma_px: halves.map(|halves| halves.map(|half| finite(half.sigma))),
+            parameters: calibration.parameters.iter().map(Parameter::from).collect(),
+            covariance: calibration
+                .covariance
+                .chunks(n.max(1))
+                .map(|row| row.iter().map(|&value| finite(value)).collect())
+                .collect(),
+            candidates: calibration.candidates.iter().map(Candidate::from).collect(),
+            views: calibration.views.iter().map(View::from).collect(),
+            outliers: calibration.outliers.iter().map(Outlier::from).collect(),
+        }
+    }
+
+    /// The camera, as `audit --calibration` takes it.
+    ///
+    /// Refused: focal lengths or a size that are not positive, a principal point that is not finite, tables that no
+    /// lens has.
+    pub fn camera(&self) -> Result<Camera, Error> {
+        let [fx, fy] = self.focal_xy_px;
+        let [cx, cy] = self.principal_point_px;
+        let [width, height] = self.image_size_px;
+        let positive = |value: f64| value.is_finite() && value > 0.0;
+        if !(positive(fx)
+            && positive(fy)
+            && cx.is_finite()
+            && cy.is_finite()
+            && width > 0
+            && height > 0)
+        {
+            return Err(Error::Camera(format!(
+                "focal lengths {fx} and {fy} px, principal point ({cx}, {cy}), image of {width}x{height}"
+            )));
+        }
+        let intrinsics = Intrinsics { fx, fy, cx, cy, width, height };
+        let distortion = camera::Distortion::try_from(&self.distortion)?;
+        Ok(Camera { intrinsics, distortion })
+    }
+}
+
+impl From<&calibrate::Parameter> for Parameter {
+    fn from(parameter: &calibrate::Parameter) -> Self {
+        let Estimate { value, sigma } = parameter.estimate;
+        Self { name: parameter.name.to_owned(), value, sigma: finite(sigma) }
+    }
+}
+
+impl From<&calibrate::Candidate> for Candidate {
+    fn from(candidate: &calibrate::Candidate) -> Self {
+        Self {
+            model: model_name(candidate.model).to_owned(),
+            rms_px: finite(candidate.rms_px),
+            held_out_rms_px: finite(candidate.held_out_rms_px),
+            focal_px: finite(candidate.focal_px.value),
+            focal_sigma_px: finite(candidate.focal_px.sigma),
+        }
+    }
+}
+
+impl From<&pose::View> for View {
+    fn from(view: &pose::View) -> Self {
+        Self {
+            frame: view.frame,
+            n_corners: view.corners.len(),
+            rms_px: view.rms_px,
+            rotation_vector_rad: view.color_from_board.rotation.scaled_axis().into(),
+            translation_m: view.color_from_board.translation.into(),
+        }
+    }
+}
+
+impl From<&calibrate::Outlier> for Outlier {
+    fn from(outlier: &calibrate::Outlier) -> Self {
+        Self { frame: outlier.frame, id: outlier.id, residual_px: finite(outlier.residual_px) }
+    }
+}
+
+impl From<&camera::Distortion> for Distortion {
+    fn from(distortion: &camera::Distortion) -> Self {
+        match distortion {
+            camera::Distortion::None => Self::None,
+            camera::Distortion::Brown(Brown { k1, k2, p1, p2, k3 }) => {
+                Self::Brown { k1: *k1, k2: *k2, p1: *p1, p2: *p2, k3: *k3 }
+            }
+            camera::Distortion::Table(TablePair { forward, inverse }) => {
+                Self::Table { forward: Table::from(forward), inverse: Table::from(inverse) }
+            }
+        }
+    }
+}
+
+impl From<&RadialTable> for Table {
+    fn from(table: &RadialTable) -> Self {
+        Self {
+            center_px: [table.center.x, table.center.y],
+            max_radius_px: table.max_radius_px,
+            magnification: table.magnification.clone(),
+        }
+    }
+}
+
+impl TryFrom<&Distortion> for camera::Distortion {
+    type Error = Error;
+
+    fn try_from(distortion: &Distortion) -> Result<Self, Error> {
+        let table = |table: &Table| {
+            let [x, y] = table.center_px;
+            RadialTable::new(Pixel::new(x, y), table.max_radius_px, table.magnification.clone())
+                .map_err(|error| Error::Camera(error.to_string()))
+        };
+        Ok(match distortion {
+            Distortion::None => Self::None,
+            &Distortion::Brown { k1, k2, p1, p2, k3 } => Self::Brown(Brown { k1, k2, p1, p2, k3 }),
+            Distortion::Table { forward, inverse } => {
+                Self::Table(TablePair { forward: table(forward)?, inverse: table(inverse)? })
+            }
+        })
+    }
+}

@@ -1,0 +1,188 @@
+//! The machine-readable output, version 1: what other programs may rely on.
+//!
+//! Names are stable and carry their units; a new field may appear, an old one neither changes nor goes within a
+//! version. What is not known is `null`, never NaN. Nothing else in the library is serialised outward: these types
+//! are copies, so that a renamed field inside does not change a file outside (golden files in `golden/` hold them).
+//!
+//! ```
+//! use truedepth::report::{to_json, wire};
+//!
+//! let document = wire::Document::Detect(wire::Detect { images: Vec::new() });
+//! let json = to_json(&document);
+//! assert_eq!(json, "{\n  \"schema\": \"truedepth.detect/1\",\n  \"images\": []\n}\n");
+//! assert!(matches!(wire::Document::from_json(&json)?, wire::Document::Detect(_)));
+//! # Ok::<(), truedepth::report::Error>(())
+//! ```
+
+mod audit;
+mod calibration;
+mod detect;
+
+pub use audit::{
+    Alignment, Audit, Board, CorrectionInfo, Depth, DeviceInfo, EvidenceInfo, FactoryInfo,
+    FindingInfo, Frame, FrameDepthInfo,
+};
+pub use calibration::{Calibration, Candidate, Distortion, Outlier, Parameter, Table, View};
+pub use detect::{Detect, DetectedCorner, DetectedImage, RejectedCorner};
+
+use serde::{Deserialize, Serialize};
+
+use super::Error;
+use crate::calibrate::Model;
+
+/// A whole file; its `schema` says which.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "schema")]
+pub enum Document {
+    /// What `truedepth detect --json` prints.
+    #[serde(rename = "truedepth.detect/1")]
+    Detect(Detect),
+    /// What `truedepth calibrate --json` prints, and `truedepth audit --calibration FILE` reads.
+    #[serde(rename = "truedepth.calibrate/1")]
+    Calibrate(Box<Calibration>),
+    /// What `truedepth audit --json` prints and `report.json` holds.
+    #[serde(rename = "truedepth.audit/1")]
+    Audit(Box<Audit>),
+}
+
+impl Document {
+    /// Reads a file that this or a newer program of wire version 1 wrote; fields that are not known are passed over.
+    pub fn from_json(text: &str) -> Result<Self, Error> {
+        serde_json::from_str(text).map_err(|error| Error::Document(error.to_string()))
+    }
+}
+
+/// The stable name of a model.
+pub(super) const fn model_name(model: Model) -> &'static str {
+    match model {
+        Model::Focal => "focal",
+        Model::FocalTable => "focal+table",
+        Model::FocalCentre => "focal+centre",
+        Model::FocalTableCentre => "focal+table+centre",
+        Model::Brown => "brown",
+    }
+}
+
+/// What is not finite is not known.
+fn finite(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        camera::{self, Brown, RadialTable, TablePair},
+        detect::Observation,
+        geom::Pixel,
+        report::{sample, to_json},
+    };
+
+    fn golden(name: &str, document: &Document) {
+        let json = to_json(document);
+        sample::assert_golden(name, &json);
+        // What was written reads back; numbers only lose what lies beyond nine digits.
+        let back = Document::from_json(&json).unwrap();
+        assert_eq!(to_json(&back), json);
+    }
+
+    #[test]
+    fn detect() {
+        let audit = sample::audit();
+        let mut seen = DetectedImage::new(
+            "rec/rgb_1.png".to_owned(),
+            [640, 480],
+            &audit.frames[0].observation,
+        );
+        seen.corners.truncate(3);
+        seen.detect_ms = Some(4.25);
+        let nothing = Observation { corners: Vec::new(), identity: None, rejects: Vec::new() };
+        let unseen = DetectedImage::new("a.png".to_owned(), [32, 16], &nothing);
+        golden("detect.json", &Document::Detect(Detect { images: vec![seen, unseen] }));
+    }
+
+    #[test]
+    fn calibrate() {
+        let audit = sample::audit();
+        let calibration = audit.calibration.as_ref().unwrap();
+        let wire = Calibration::new(&audit.name, "auto", audit.factory.as_ref(), calibration);
+        golden("calibrate.json", &Document::Calibrate(Box::new(wire)));
+    }
+
+    #[test]
+    fn audit() {
+        golden("audit.json", &Document::Audit(Box::new(Audit::from(&sample::audit()))));
+    }
+
+    #[test]
+    fn a_camera_comes_back() {
+        let audit = sample::audit();
+        let mut calibration = audit.calibration.unwrap();
+        let table = |sign: f64| {
+            let magnification = (0..42).map(|i| sign * 1e-5 * f64::from(i * i)).collect();
+            RadialTable::new(Pixel::new(320.5, 241.1), 400.25, magnification).unwrap()
+        };
+        for distortion in [
+            camera::Distortion::None,
+            camera::Distortion::Brown(Brown { k1: 0.07, k2: -0.1, p1: 1e-4, p2: -2e-4, k3: 0.01 }),
+            camera::Distortion::Table(TablePair { forward: table(-1.0), inverse: table(1.0) }),
+        ] {
+            calibration.camera.distortion = distortion;
+            let json = to_json(&Document::Calibrate(Box::new(Calibration::new(
+                "r",
+                "auto",
+                None,
+                &calibration,
+            ))));
+            let Document::Calibrate(back) = Document::from_json(&json).unwrap() else {
+                panic!("{json}")
+            };
+            let camera = back.camera().unwrap();
+            let pixel = Pixel::new(612.0, 31.0);
+            let [expected, found] =
+                [&calibration.camera, &camera].map(|c| c.unproject(pixel).unwrap());
+            assert!((expected[0] - found[0]).abs() + (expected[1] - found[1]).abs() < 1e-8);
+        }
+    }
+
+    #[test]
+    fn documents_that_are_none() {
+        for text in [
+            "",
+            "{}",
+            "[]",
+            "{\"schema\": \"truedepth.audit/2\"}",
+            "{\"schema\": \"truedepth.detect/1\"}",
+        ] {
+            let error = Document::from_json(text).unwrap_err().to_string();
+            assert!(error.contains("truedepth calibrate --json"), "{error}");
+        }
+        let audit = sample::audit();
+        let good = Calibration::new("r", "auto", None, audit.calibration.as_ref().unwrap());
+        assert!(good.camera().is_ok());
+        let folding =
+            || Table { center_px: [1.0, 1.0], max_radius_px: 9.0, magnification: vec![0.0, -3.0] };
+        for bad in [
+            Calibration { focal_xy_px: [0.0, 530.0], ..good.clone() },
+            Calibration { focal_xy_px: [530.0, f64::INFINITY], ..good.clone() },
+            Calibration { principal_point_px: [f64::NAN, 1.0], ..good.clone() },
+            Calibration { image_size_px: [0, 480], ..good.clone() },
+            Calibration {
+                distortion: Distortion::Table { forward: folding(), inverse: folding() },
+                ..good.clone()
+            },
+        ] {
+            assert!(bad.camera().is_err(), "{bad:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_a_number_is_null() {
+        let mut audit = sample::audit();
+        audit.findings[1].sigma = Some(f64::NAN);
+        audit.frames[0].own_view.as_mut().unwrap().rms_px = f64::INFINITY;
+        let json = to_json(&Document::Audit(Box::new(Audit::from(&audit))));
+        assert!(json.contains("\"sigma\": null") && json.contains("\"own_rms_px\": null"));
+        assert!(Document::from_json(&json).is_ok());
+    }
+}

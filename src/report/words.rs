@@ -1,0 +1,341 @@
+//! Words and numbers as people read them; terminal and page say the same.
+
+use super::svg::minus;
+use crate::{
+    audit::Audit,
+    calibrate::{Estimate, Model},
+    diagnose::{Code, Finding, Sensor, Unit, Verdict},
+};
+
+/// One line of the table of quantities.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Row {
+    pub(super) quantity: String,
+    pub(super) factory: String,
+    pub(super) measured: String,
+    pub(super) difference: String,
+    /// The check that judges it, where one does.
+    pub(super) verdict: Option<(Code, Verdict)>,
+}
+
+/// What stands above the first four columns.
+pub(super) const HEADER: [&str; 4] = ["", "factory", "measured", "difference"];
+
+/// The table of quantities: one row for each check, and the error of the depth beside them.
+pub(super) fn rows(audit: &Audit) -> Vec<Row> {
+    let mut rows: Vec<Row> = audit.findings.iter().map(|finding| row(audit, finding)).collect();
+    let error = |depth: Option<&crate::depth::BoardDepth>| {
+        let estimate = depth.and_then(|depth| depth.mean_of_medians_m);
+        estimate.map_or("—".to_owned(), |e| format!("{} mm", signed_with_sigma(in_mm(e), 2)))
+    };
+    if audit.factory_depth.is_some() || audit.own_depth.is_some() {
+        let depth_row = Row {
+            quantity: "Depth error".to_owned(),
+            factory: error(audit.factory_depth.as_ref()),
+            measured: error(audit.own_depth.as_ref()),
+            difference: String::new(),
+            verdict: None,
+        };
+        // Beside the other checks of the depth.
+        let at =
+            rows.iter().position(|row| row.verdict.is_some_and(|(code, _)| code >= Code::TD301));
+        rows.insert(at.unwrap_or(rows.len()), depth_row);
+    }
+    rows
+}
+
+fn row(audit: &Audit, finding: &Finding) -> Row {
+    let dash = || "—".to_owned();
+    let factory = audit.factory.as_ref().map(|factory| &factory.intrinsics);
+    let line = audit
+        .own_depth
+        .as_ref()
+        .or(audit.factory_depth.as_ref())
+        .and_then(|depth| depth.line.as_ref());
+    let (factory, measured) = match finding.code {
+        Code::TD201 => (
+            factory.map_or_else(dash, |f| format!("{} px", plain(f.focal_px(), 2))),
+            focal(audit).map_or_else(dash, |focal| format!("{} px", value_and_sigma(focal, 2))),
+        ),
+        Code::TD203 => (dash(), audit.distortion_state.name().replace('_', " ")),
+        Code::TD301 => {
+            ("1".to_owned(), line.map_or_else(dash, |line| value_and_sigma(line.scale, 4)))
+        }
+        Code::TD302 => (
+            "0 mm".to_owned(),
+            line.map_or_else(dash, |line| format!("{} mm", value_and_sigma(in_mm(line.bias_m), 2))),
+        ),
+        _ => (String::new(), String::new()),
+    };
+    Row {
+        quantity: finding.title().to_owned(),
+        factory,
+        measured,
+        difference: difference(finding),
+        verdict: Some((finding.code, finding.verdict)),
+    }
+}
+
+/// The finding's value with its σ and unit, signed.
+pub(super) fn difference(finding: &Finding) -> String {
+    let Some(value) = finding.value.filter(|value| value.is_finite()) else { return String::new() };
+    if finding.unit == Unit::Count {
+        return plain(value, 0);
+    }
+    let sigma = finding.sigma.unwrap_or(f64::NAN);
+    format!("{} {}", signed_with_sigma(Estimate { value, sigma }, 2), unit(finding.unit))
+}
+
+/// The unit as people write it.
+pub(super) const fn unit(unit: Unit) -> &'static str {
+    match unit {
+        Unit::Degrees => "°",
+        other => other.symbol(),
+    }
+}
+
+/// The own focal length: as the check of the focal length judged it (its σ knows more than the fit's own), else as it
+/// was calibrated or given.
+pub(super) fn focal(audit: &Audit) -> Option<Estimate> {
+    let check = audit.findings.iter().find(|finding| finding.code == Code::TD201);
+    let judged = check
+        .and_then(|finding| finding.evidence.iter().find(|evidence| evidence.name == "focal_px"));
+    if let Some(evidence) = judged {
+        return Some(Estimate { value: evidence.value, sigma: evidence.sigma.unwrap_or(f64::NAN) });
+    }
+    let calibrated = audit.calibration.as_ref().map(|calibration| {
+        let sigma =
+            calibration.parameters.iter().find(|p| p.name == "focal_px").map(|p| p.estimate.sigma);
+        Estimate {
+            value: calibration.camera.intrinsics.focal_px(),
+            sigma: sigma.unwrap_or(f64::NAN),
+        }
+    });
+    let given = || {
+        audit
+            .camera
+            .as_ref()
+            .map(|camera| Estimate { value: camera.intrinsics.focal_px(), sigma: f64::NAN })
+    };
+    calibrated.or_else(given)
+}
+
+/// Metres as millimetres.
+pub(super) fn in_mm(estimate: Estimate) -> Estimate {
+    Estimate { value: 1e3 * estimate.value, sigma: 1e3 * estimate.sigma }
+}
+
+/// The recording and its camera.
+pub(super) fn device_line(audit: &Audit) -> String {
+    format!("{} · {}", audit.name, camera_line(audit))
+}
+
+/// Which camera: what people most often do not know stands first.
+pub(super) fn camera_line(audit: &Audit) -> String {
+    let sensor = match audit.device.sensor {
+        Sensor::TrueDepth => "TrueDepth (front camera)",
+        Sensor::Lidar => "LiDAR (rear camera, not TrueDepth)",
+        Sensor::Unknown => "unknown camera (the files do not say)",
+    };
+    let mut parts = vec![sensor.to_owned()];
+    if audit.device.device_type.as_deref().is_some_and(|name| name.starts_with("AVCapture")) {
+        parts.push("AVFoundation".to_owned());
+    }
+    if let Some(model) = audit.device.model {
+        parts.push(format!("intrinsics of {model}"));
+    }
+    parts.join(" · ")
+}
+
+/// What was looked at.
+pub(super) fn board_line(audit: &Audit) -> String {
+    let board = &audit.board;
+    let size = audit.frames.iter().find_map(|frame| frame.size_px);
+    let size = size.map_or(String::new(), |[width, height]| format!(" of {width}x{height} px"));
+    format!(
+        "{}{size}, board seen in {} · {}x{} squares of {} mm, {}",
+        count(audit.frames.len(), "frame"),
+        audit.n_frames_with_board(),
+        board.squares_x,
+        board.squares_y,
+        trimmed(1e3 * board.square_m, 3),
+        board.dictionary.name(),
+    )
+}
+
+/// The outcome in one sentence.
+pub(super) fn headline(audit: &Audit) -> (Verdict, String) {
+    let number = |verdict| audit.findings.iter().filter(|f| f.verdict == verdict).count();
+    match (number(Verdict::Fault), number(Verdict::Unknown)) {
+        (0, 0) if audit.findings.is_empty() => {
+            (Verdict::Unknown, "Nothing could be checked.".to_owned())
+        }
+        (0, 0) => (Verdict::Ok, "This recording shows no fault.".to_owned()),
+        (0, unknown) => {
+            let verb = if unknown == 1 { "check cannot" } else { "checks cannot" };
+            (Verdict::Unknown, format!("No fault seen, but {unknown} {verb} tell."))
+        }
+        (faults, _) => {
+            let titles = by_severity(audit)
+                .into_iter()
+                .take(faults)
+                .map(|finding| finding.title().to_lowercase());
+            let titles = titles.collect::<Vec<_>>().join(", ");
+            (Verdict::Fault, format!("This recording has {}: {titles}.", count(faults, "fault")))
+        }
+    }
+}
+
+/// Faults first, each group by code.
+pub(super) fn by_severity(audit: &Audit) -> Vec<&Finding> {
+    let mut findings: Vec<&Finding> = audit.findings.iter().collect();
+    findings.sort_by_key(|finding| (finding.verdict, finding.code));
+    findings
+}
+
+/// The verdict as a word that needs no colour.
+pub(super) const fn verdict_word(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Fault => "FAULT",
+        Verdict::Warning => "WARNING",
+        Verdict::Unknown => "CANNOT TELL",
+        Verdict::Info => "INFO",
+        Verdict::Ok => "OK",
+    }
+}
+
+/// What to type to read more.
+pub(super) fn explain_command(finding: &Finding) -> String {
+    format!("truedepth explain {}", finding.code)
+}
+
+/// A model as people say it.
+pub(super) const fn model(model: Model) -> &'static str {
+    match model {
+        Model::Focal => "focal length only",
+        Model::FocalTable => "focal length, Apple's table",
+        Model::FocalCentre => "focal length and centre",
+        Model::FocalTableCentre => "focal length and centre, Apple's table",
+        Model::Brown => "Brown (k1 k2 p1 p2 k3)",
+    }
+}
+
+/// A model in a few letters, for the margin of a figure.
+pub(super) const fn model_short(model: Model) -> &'static str {
+    match model {
+        Model::Focal => "focal",
+        Model::FocalTable => "focal, table",
+        Model::FocalCentre => "focal, centre",
+        Model::FocalTableCentre => "focal, centre, table",
+        Model::Brown => "Brown",
+    }
+}
+
+/// The value and its σ, with two digits of the σ, and no more than `max_decimals` after the point. A σ that is not
+/// finite is left out.
+pub(super) fn value_and_sigma(estimate: Estimate, max_decimals: usize) -> String {
+    let Estimate { value, sigma } = estimate;
+    if !value.is_finite() {
+        return "—".to_owned();
+    }
+    if !(sigma.is_finite() && sigma > 0.0) {
+        return minus(&format!("{value:.max_decimals$}"));
+    }
+    let decimals = decimals_of_sigma(sigma).min(max_decimals);
+    // A σ below the last digit shown is not zero: say that it is smaller.
+    let smallest = 10f64.powi(-(decimals as i32));
+    let sigma = if sigma < 0.5 * smallest {
+        format!("< {smallest:.decimals$}")
+    } else {
+        format!("{sigma:.decimals$}")
+    };
+    format!("{} ± {sigma}", minus(&format!("{value:.decimals$}")))
+}
+
+/// As [`value_and_sigma`], with a sign before what is positive.
+pub(super) fn signed_with_sigma(estimate: Estimate, max_decimals: usize) -> String {
+    let text = value_and_sigma(estimate, max_decimals);
+    let value = text.split(' ').next().unwrap_or_default();
+    let is_positive = !value.starts_with('−') && value.contains(|c: char| matches!(c, '1'..='9'));
+    if is_positive { format!("+{text}") } else { text }
+}
+
+/// Numbers kept on one line with their units and their σ, for running text.
+pub(super) fn unbroken(text: &str) -> String {
+    const UNITS: [&str; 6] = [" px", " %", " mm", " σ", " ±", " °"];
+    let text = text.replace("± ", "±\u{a0}");
+    UNITS.iter().fold(text, |text, unit| text.replace(unit, &unit.replace(' ', "\u{a0}")))
+}
+
+/// Digits after the point that show two digits of a σ.
+fn decimals_of_sigma(sigma: f64) -> usize {
+    // 0.0995 rounds to 0.10 and 9.95 to 10: the exponent is that of the rounded σ.
+    let exponent = (sigma * 1.005).log10().floor();
+    (1.0 - exponent).max(0.0) as usize
+}
+
+/// The value with its sign, `+0.3` or `−6.2`.
+pub(super) fn signed(value: f64, decimals: usize) -> String {
+    let text = plain(value, decimals);
+    let is_zero = !text.contains(|c: char| c.is_ascii_digit() && c != '0');
+    if is_zero || text.starts_with('−') { text } else { format!("+{text}") }
+}
+
+/// The value, without a sign where it is positive; a dash where it is no number.
+pub(super) fn plain(value: f64, decimals: usize) -> String {
+    if value.is_finite() { minus(&format!("{value:.decimals$}")) } else { "—".to_owned() }
+}
+
+/// The value without zeros at its end.
+pub(super) fn trimmed(value: f64, decimals: usize) -> String {
+    let text = plain(value, decimals);
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
+}
+
+/// `1 frame`, `2 frames`.
+pub(super) fn count(number: usize, noun: &str) -> String {
+    format!("{number} {noun}{}", if number == 1 { "" } else { "s" })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn digits_follow_sigma() {
+        for (value, sigma, expected) in [
+            (530.0361, 0.352, "530.04 ± 0.35"),
+            (530.0361, 0.0152, "530.036 ± 0.015"),
+            (-6.214, 0.0996, "−6.21 ± 0.10"),
+            (-6.214, 9.96, "−6 ± 10"),
+            (-6.214, 120.0, "−6 ± 120"),
+            (1.0, 0.0002, "1.000 ± < 0.001"),
+            (1.0, 0.0, "1.000"),
+            (1.0, f64::NAN, "1.000"),
+            (-0.0001, 0.0001, "0.000 ± < 0.001"),
+            (f64::NAN, 1.0, "—"),
+        ] {
+            assert_eq!(value_and_sigma(Estimate { value, sigma }, 3), expected);
+        }
+    }
+
+    #[test]
+    fn signs_and_zeros() {
+        assert_eq!([signed(0.26, 1), signed(-0.26, 1), signed(-0.01, 1)], ["+0.3", "−0.3", "0.0"]);
+        let estimate = |value| Estimate { value, sigma: 0.25 };
+        assert_eq!(
+            [0.5, -0.5, 0.001].map(|value| signed_with_sigma(estimate(value), 1)),
+            ["+0.5 ± 0.2", "−0.5 ± 0.2", "0.0 ± 0.2"]
+        );
+        assert_eq!(unbroken("6.2 ± 0.1 % of 5 px"), "6.2\u{a0}±\u{a0}0.1\u{a0}% of 5\u{a0}px");
+        assert_eq!([count(1, "frame"), count(0, "frame")], ["1 frame", "0 frames"]);
+        assert_eq!(
+            [trimmed(20.875, 3), trimmed(20.0, 3), trimmed(200.0, 0)],
+            ["20.875", "20", "200"]
+        );
+    }
+}
