@@ -1,0 +1,440 @@
+//! What was typed.
+
+use std::path::PathBuf;
+
+use clap::{Parser, Subcommand, ValueEnum, builder::PossibleValuesParser};
+use truedepth::{
+    board::{self, CharucoBoard},
+    simulate::{Device, Fault, FaultError},
+};
+
+/// Is the depth of an Apple TrueDepth recording true? And if not: what is wrong, by how much, how sure, what fixes it?
+#[derive(Debug, Parser)]
+#[command(
+    name = "truedepth",
+    version,
+    propagate_version = true,
+    arg_required_else_help = true,
+    subcommand_required = true,
+    after_help = TOP_EXAMPLES,
+    after_long_help = TOP_LONG
+)]
+pub(crate) struct Args {
+    #[command(flatten)]
+    pub(crate) global: GlobalArgs,
+
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+const TOP_EXAMPLES: &str = "\
+Examples:
+  truedepth demo                 no device, no data: simulate a faulty iPad, audit it, see the report
+  truedepth audit my-recording   everything that can be known of a recording of a ChArUco board
+  truedepth explain TD201        what a finding means and what to do about it";
+
+const TOP_LONG: &str = "\
+Examples:
+  truedepth demo                 no device, no data: simulate a faulty iPad, audit it, see the report
+  truedepth audit my-recording   everything that can be known of a recording of a ChArUco board
+  truedepth explain TD201        what a finding means and what to do about it
+
+Results go to stdout; progress, warnings and other words go to stderr.
+
+Exit codes:
+  0  ran, no fault found
+  1  could not run (or not on every recording given)
+  2  the command line was not understood
+  3  ran, and found faults";
+
+/// Options of every verb.
+#[derive(Debug, clap::Args)]
+pub(crate) struct GlobalArgs {
+    /// Say nothing on stderr but warnings and errors
+    #[arg(short, long, global = true, conflicts_with = "verbose", help_heading = "Global options")]
+    pub(crate) quiet: bool,
+
+    /// Say more on stderr
+    #[arg(short, long, global = true, help_heading = "Global options")]
+    pub(crate) verbose: bool,
+
+    /// When to use colour
+    ///
+    /// `auto`: on a terminal, unless NO_COLOR is set. Colour never says anything that the words do not.
+    #[arg(
+        long,
+        global = true,
+        value_name = "WHEN",
+        default_value = "auto",
+        help_heading = "Global options"
+    )]
+    pub(crate) color: ColorChoice,
+
+    /// Use this many threads [default: one per core]
+    ///
+    /// The result does not depend on it, byte for byte.
+    #[arg(
+        long,
+        global = true,
+        value_name = "N",
+        value_parser = clap::value_parser!(u16).range(1..=1024),
+        help_heading = "Global options"
+    )]
+    pub(crate) threads: Option<u16>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ColorChoice {
+    Auto,
+    Always,
+    Never,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Find out everything that can be known of a recording of a ChArUco board
+    ///
+    /// Finds the board in every frame, calibrates, compares the sensor's depth with the board's under the factory's
+    /// and under the measured intrinsics, and judges. Shows a summary, and leaves report.html (open it in a browser)
+    /// and report.json (for programs) in a folder NAME-report here, or where -o says. An older report of truedepth in
+    /// that folder is replaced; a folder with anything else in it is refused.
+    ///
+    /// Exits with 3 where faults were found, 0 where none, 1 where a recording could not be audited.
+    #[command(after_help = AUDIT_EXAMPLES)]
+    Audit(AuditArgs),
+
+    /// Measure the camera's intrinsics, with uncertainties
+    ///
+    /// The part of `audit` that looks at the camera only. What --json prints can be given to
+    /// `audit --calibration` for recordings that cannot calibrate themselves, like a few views straight at the board.
+    #[command(after_help = CALIBRATE_EXAMPLES)]
+    Calibrate(CalibrateArgs),
+
+    /// Find the ChArUco corners of images, folders and recordings
+    ///
+    /// Old and new board layouts are told apart from the image. Integer pixel coordinates are pixel centres; corner
+    /// ids are those of OpenCV 4.6 and newer. The detector may miss a corner; it does not guess.
+    #[command(after_help = DETECT_EXAMPLES)]
+    Detect(DetectArgs),
+
+    /// Simulate a faulty iPad, audit it, and show truth beside findings; needs no device and no data
+    ///
+    /// Renders a recording of an iPad whose metadata state a focal length 6.6 % too long and whose depth is 1.5 % too
+    /// long, audits it as if nothing were known of it, and leaves the report in ./truedepth-demo. Exits with 3: the
+    /// faults are found.
+    #[command(after_help = DEMO_EXAMPLES)]
+    Demo(DemoArgs),
+
+    /// Render a recording with known truth and chosen faults
+    ///
+    /// Writes the same files as the capture app, and truth.json with what is true of them. The same options give the
+    /// same bytes.
+    #[command(after_help = simulate_help())]
+    Simulate(SimulateArgs),
+
+    /// Say what a finding means and what to do about it
+    ///
+    /// Without a code, list them all.
+    #[command(after_help = EXPLAIN_EXAMPLES)]
+    Explain(ExplainArgs),
+
+    /// Print completions for a shell
+    #[command(after_help = COMPLETIONS_EXAMPLES)]
+    Completions(CompletionsArgs),
+
+    /// Print the manual page of truedepth, or of one verb
+    #[command(after_help = MAN_EXAMPLES)]
+    Man(ManArgs),
+}
+
+/// The board, where the recording does not tell it.
+#[derive(Debug, clap::Args)]
+pub(crate) struct BoardArgs {
+    /// The printed board: a board.toml, or SQUARES:SQUARE:MARKER:DICTIONARY
+    ///
+    /// Needed where the recording brings neither a board.toml nor a checkersize.txt; given here it goes before both.
+    /// In short form: squares along x and y, side of a square, side of a marker (black border included), dictionary
+    /// as OpenCV names it, and `legacy` or `new` if the layout is known (else it is found from the images), like
+    /// 10x8:20.875mm:10.4375mm:ARUCO_ORIGINAL. Lengths carry a unit (mm, cm, m, in). Measure the print: printers
+    /// scale.
+    #[arg(long, value_name = "FILE|SPEC", value_parser = board_argument)]
+    pub(crate) board: Option<BoardArgument>,
+}
+
+/// A board as it was typed.
+#[derive(Clone, Debug)]
+pub(crate) enum BoardArgument {
+    /// A `board.toml`.
+    File(PathBuf),
+    /// The short form.
+    Board(CharucoBoard),
+}
+
+/// The short form has colons; so have paths on Windows, but those end like a file.
+fn board_argument(text: &str) -> Result<BoardArgument, board::Error> {
+    if text.contains(':') && !text.ends_with(".toml") {
+        return Ok(BoardArgument::Board(text.parse()?));
+    }
+    Ok(BoardArgument::File(PathBuf::from(text)))
+}
+
+/// How to calibrate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Method {
+    /// The model that predicts held-out corners best: focal length, with Apple's table, with centre, Brown-Conrady
+    Auto,
+    /// As arXiv:2201.10865: one focal length, a 4 cm grid of views, all else as the factory says
+    Paper,
+}
+
+/// For programs.
+#[derive(Debug, clap::Args)]
+pub(crate) struct JsonArgs {
+    /// Print the machine-readable result on stdout, and nothing else there
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct AuditArgs {
+    /// Recordings: folders as the capture app writes them, or zips of them
+    ///
+    /// A folder or zip may hold several recordings; each is audited, in order. The exit code is the worst of all.
+    #[arg(required = true, value_name = "REC")]
+    pub(crate) recordings: Vec<PathBuf>,
+
+    /// Where the report goes [default: NAME-report in the current folder; none with --json]
+    ///
+    /// With several recordings, each gets a folder NAME-report inside.
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: Option<PathBuf>,
+
+    /// How to calibrate
+    #[arg(long, default_value = "auto")]
+    pub(crate) method: Method,
+
+    #[command(flatten)]
+    pub(crate) board: BoardArgs,
+
+    /// Take the camera from this file instead of calibrating
+    ///
+    /// The file is what `truedepth calibrate --json` printed, or the report.json of an audit.
+    #[arg(long, value_name = "FILE", conflicts_with = "method")]
+    pub(crate) calibration: Option<PathBuf>,
+
+    /// Print the machine-readable result on stdout, and nothing else there
+    ///
+    /// One JSON document per recording. No report is written unless -o is given.
+    #[arg(long)]
+    pub(crate) json: bool,
+
+    /// Open the report in a browser
+    #[arg(long)]
+    pub(crate) open: bool,
+}
+
+const AUDIT_EXAMPLES: &str = "\
+Examples:
+  truedepth audit my-recording
+  truedepth audit Archive.zip -o reports
+  truedepth audit shots --board 10x8:20.875mm:10.4375mm:ARUCO_ORIGINAL
+  truedepth calibrate moving --json > camera.json && truedepth audit still --calibration camera.json
+  truedepth audit my-recording --json | jq '.findings[] | select(.severity == \"fault\")'";
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct CalibrateArgs {
+    /// The recording: a folder as the capture app writes it, or a zip of it
+    #[arg(value_name = "REC")]
+    pub(crate) recording: PathBuf,
+
+    /// How to calibrate
+    #[arg(long, default_value = "auto")]
+    pub(crate) method: Method,
+
+    #[command(flatten)]
+    pub(crate) board: BoardArgs,
+
+    #[command(flatten)]
+    pub(crate) json: JsonArgs,
+}
+
+const CALIBRATE_EXAMPLES: &str = "\
+Examples:
+  truedepth calibrate my-recording
+  truedepth calibrate my-recording --method paper
+  truedepth calibrate my-recording --json > camera.json";
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct DetectArgs {
+    /// Recordings, folders of PNG images, or PNG images
+    #[arg(required = true, value_name = "PATH")]
+    pub(crate) paths: Vec<PathBuf>,
+
+    #[command(flatten)]
+    pub(crate) board: BoardArgs,
+
+    #[command(flatten)]
+    pub(crate) json: JsonArgs,
+
+    /// Say how long decoding and searching took, per image
+    ///
+    /// With --threads 1 images are searched one after another and the times are those of one core.
+    #[arg(long)]
+    pub(crate) timings: bool,
+}
+
+const DETECT_EXAMPLES: &str = "\
+Examples:
+  truedepth detect my-recording
+  truedepth detect photo.png --board 7x5:30mm:21mm:4X4_50
+  truedepth detect my-recording --json --timings --threads 1 > corners.json";
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct DemoArgs {
+    /// Where the report goes
+    #[arg(short, long, value_name = "DIR", default_value = "truedepth-demo")]
+    pub(crate) output: PathBuf,
+
+    /// Chooses views, noise and light
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+
+    #[command(flatten)]
+    pub(crate) json: JsonArgs,
+
+    /// Open the report in a browser
+    #[arg(long)]
+    pub(crate) open: bool,
+}
+
+const DEMO_EXAMPLES: &str = "\
+Examples:
+  truedepth demo
+  truedepth demo --open
+  truedepth demo --seed 7 -o another-demo";
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct SimulateArgs {
+    /// The folder to write; new or empty
+    #[arg(short, long, value_name = "REC")]
+    pub(crate) output: PathBuf,
+
+    /// The device
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Device::ALL.map(|d| d.name)))]
+    pub(crate) device: String,
+
+    /// What is wrong with it; may be given several times
+    #[arg(long = "fault", value_name = "FAULT", value_parser = fault)]
+    pub(crate) faults: Vec<Option<Fault>>,
+
+    /// How the camera is led: round the board for calibration, or straight at it for depth
+    #[arg(long, default_value = "hand-held")]
+    pub(crate) trajectory: Trajectory,
+
+    /// Frames to take [default: 50 hand-held, 5 fronto-parallel]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=10_000))]
+    pub(crate) frames: Option<u16>,
+
+    /// Chooses views, noise and light
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub(crate) seed: u64,
+
+    #[command(flatten)]
+    pub(crate) board: BoardArgs,
+}
+
+/// How a simulated camera is led.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Trajectory {
+    /// Round the board, near and far, tilted
+    HandHeld,
+    /// Straight at the board, about 200 mm away
+    FrontoParallel,
+}
+
+/// `none` is no fault.
+fn fault(text: &str) -> Result<Option<Fault>, FaultError> {
+    if text == "none" { Ok(None) } else { text.parse().map(Some) }
+}
+
+fn simulate_help() -> String {
+    let mut text = String::from(
+        "\
+Examples:
+  truedepth simulate -o ipad --device ipad-12.9-5gen --fault focal=6.6%
+  truedepth simulate -o still --device iphone-11-pro --trajectory fronto-parallel --seed 7
+  truedepth simulate -o bad --device ipad-12.9-4gen --fault depth-zoom=0.9507 --fault mirrored
+
+Faults:
+",
+    );
+    for (form, words) in Fault::known() {
+        text.push_str(&format!("  {form:<22} {words}\n"));
+    }
+    text
+}
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct ExplainArgs {
+    /// The code of a finding, like TD201
+    pub(crate) code: Option<String>,
+}
+
+const EXPLAIN_EXAMPLES: &str = "\
+Examples:
+  truedepth explain              all codes
+  truedepth explain TD201        what it measures, why it matters, how it is done, what to do";
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct CompletionsArgs {
+    /// The shell
+    pub(crate) shell: clap_complete::Shell,
+}
+
+const COMPLETIONS_EXAMPLES: &str = "\
+Examples:
+  truedepth completions bash > ~/.local/share/bash-completion/completions/truedepth
+  truedepth completions zsh > ~/.zfunc/_truedepth
+  truedepth completions fish > ~/.config/fish/completions/truedepth.fish";
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct ManArgs {
+    /// The verb whose page to print
+    pub(crate) verb: Option<String>,
+}
+
+const MAN_EXAMPLES: &str = "\
+Examples:
+  truedepth man | man -l -
+  truedepth man audit > truedepth-audit.1";
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_definition_holds_together() {
+        Args::command().debug_assert();
+    }
+
+    #[test]
+    fn every_verb_shows_an_example_of_itself() {
+        for verb in Args::command().get_subcommands() {
+            let name = verb.get_name();
+            let examples = verb.get_after_help().map(ToString::to_string).unwrap_or_default();
+            assert!(examples.contains(&format!("truedepth {name}")), "{name}");
+            assert!(verb.get_about().is_some(), "{name}");
+        }
+    }
+
+    #[test]
+    fn every_option_is_explained() {
+        for verb in Args::command().get_subcommands() {
+            for arg in verb.get_arguments() {
+                assert!(arg.get_help().is_some(), "{} {}", verb.get_name(), arg.get_id());
+            }
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! `truedepth audit REC...`
+
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
+
+use truedepth::{
+    audit::{Audit, Method, Options, Progress, audit_observed},
+    recording::{Found, Recording},
+    report::{self, Photo, wire},
+};
+
+use crate::{
+    args::{self, AuditArgs},
+    failure::Failure,
+    files::{self, ReportFolder},
+    input,
+    outcome::Outcome,
+    terminal::Terminal,
+};
+
+pub(crate) fn run(args: &AuditArgs, terminal: &Terminal) -> Result<Outcome, Failure> {
+    let options = options(args)?;
+    let mut worst = Outcome::Clean;
+    let mut found = Vec::new();
+    for path in &args.recordings {
+        match input::recordings(path) {
+            Ok(inside) => found.extend(inside),
+            Err(failure) if args.recordings.len() == 1 => return Err(failure),
+            Err(failure) => {
+                terminal.failure(&failure);
+                worst = Outcome::NotAllRan;
+            }
+        }
+    }
+    let alone = args.recordings.len() == 1 && found.len() == 1;
+    let mut taken = BTreeSet::new();
+    for (index, found) in found.into_iter().enumerate() {
+        if index > 0 && !args.json {
+            terminal.result("\n")?;
+        }
+        let folder = report_folder(args, &found.name, alone, &mut taken);
+        match one(found, &options, folder.as_deref(), args, terminal) {
+            Ok(outcome) => worst = worst.max(outcome),
+            Err(failure) if alone => return Err(failure),
+            Err(failure) => {
+                terminal.failure(&failure);
+                worst = Outcome::NotAllRan;
+            }
+        }
+    }
+    Ok(worst)
+}
+
+/// What was typed, as the library understands it.
+fn options(args: &AuditArgs) -> Result<Options, Failure> {
+    let method = match (&args.calibration, args.method) {
+        (Some(path), _) => Method::Given(Box::new(input::camera(path)?)),
+        (None, args::Method::Auto) => Method::Auto,
+        (None, args::Method::Paper) => Method::Paper,
+    };
+    let mut options = Options::new(method);
+    options.board = input::board(&args.board)?;
+    Ok(options)
+}
+
+/// Where the report of a recording goes; `None` for no report. Of several recordings each gets a folder of its own.
+fn report_folder(
+    args: &AuditArgs,
+    name: &str,
+    alone: bool,
+    taken: &mut BTreeSet<PathBuf>,
+) -> Option<PathBuf> {
+    let parent = match &args.output {
+        Some(folder) if alone => return Some(folder.clone()),
+        Some(folder) => folder.as_path(),
+        None if args.json => return None,
+        None => Path::new(""),
+    };
+    // A name may come out of an archive: take its last part only, and never a dot.
+    let name = name.rsplit(['/', '\\']).next().unwrap_or_default();
+    let name = if name.trim_matches('.').is_empty() { "recording" } else { name };
+    // Two recordings of one run may have one name.
+    (1..)
+        .map(|n| match n {
+            1 => parent.join(format!("{name}-report")),
+            n => parent.join(format!("{name}-report-{n}")),
+        })
+        .find(|path| taken.insert(path.clone()))
+}
+
+/// Audits one recording: the result to stdout, the report into its folder.
+fn one(
+    found: Found,
+    options: &Options,
+    folder: Option<&Path>,
+    args: &AuditArgs,
+    terminal: &Terminal,
+) -> Result<Outcome, Failure> {
+    // A folder that must not be written is better known before the work than after.
+    let folder = folder.map(ReportFolder::new).transpose()?;
+    let recording = found.open()?;
+    terminal.detail(&format!("{}: {} frames", recording.place(), recording.frames.len()));
+    let audit = observed(&recording, options, terminal)?;
+    let json = report::to_json(&wire::Document::Audit(Box::new(wire::Audit::from(&audit))));
+    if let Some(folder) = &folder {
+        folder.write(&json, &page(&recording, &audit)?)?;
+    }
+    if args.json {
+        terminal.result(&json)?;
+    } else {
+        terminal.lines(&report::summary(&audit))?;
+    }
+    if let Some(folder) = folder {
+        terminal.say(&format!("report: {}", folder.html().display()));
+        if args.open {
+            files::open(&folder.html())?;
+        }
+    }
+    Ok(if audit.has_faults() { Outcome::Faults } else { Outcome::Clean })
+}
+
+/// The audit, with a progress bar.
+pub(crate) fn observed(
+    recording: &Recording,
+    options: &Options,
+    terminal: &Terminal,
+) -> Result<Audit, Failure> {
+    let bar = terminal.progress(&recording.name, recording.frames.len());
+    let audit = audit_observed(recording, options, &|Progress { stage, done, total }| {
+        bar.set_message(format!("{}: {}", recording.name, stage.name()));
+        bar.set_length(total as u64);
+        bar.set_position(done as u64);
+    });
+    bar.finish_and_clear();
+    Ok(audit?)
+}
+
+/// The report as a page, with a few of the recording's images.
+pub(crate) fn page(recording: &Recording, audit: &Audit) -> Result<String, Failure> {
+    let photos = report::frames_to_show(audit)
+        .into_iter()
+        .map(|frame| Photo::read(recording, frame))
+        .collect::<Result<Vec<_>, _>>()?;
+    Ok(report::page(audit, &photos))
+}

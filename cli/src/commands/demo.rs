@@ -1,0 +1,105 @@
+//! `truedepth demo`
+
+use std::sync::Arc;
+
+use truedepth::{
+    audit::{Method, Options},
+    recording::{Limits, Memory, Recording},
+    report::{self, Tone, wire},
+    simulate::{Device, Fault, Faults, Plan, Truth},
+};
+
+use super::audit::{observed, page};
+use crate::{
+    args::DemoArgs,
+    failure::Failure,
+    files::{self, ReportFolder, file_url, write_atomically},
+    outcome::Outcome,
+    terminal::Terminal,
+};
+
+/// The tablet of the paper's issue 2 (arXiv:2201.10865), as bad as it was measured there.
+const DEVICE: &str = "ipad-12.9-5gen";
+const FAULTS: [Fault; 2] = [Fault::Focal { excess: 0.066 }, Fault::DepthScale { excess: 0.015 }];
+
+pub(crate) fn run(args: &DemoArgs, terminal: &Terminal) -> Result<Outcome, Failure> {
+    let folder = ReportFolder::new(&args.output)?;
+    let mut plan = Plan::new(Device::named(DEVICE)?, args.seed);
+    plan.faults = Faults::new(FAULTS)?;
+    plan.n_frames = 30;
+
+    let faults: Vec<String> = FAULTS.iter().map(ToString::to_string).collect();
+    terminal.say(&format!(
+        "simulating {} frames of an {} with {}",
+        plan.n_frames,
+        plan.device.product,
+        faults.join(" and ")
+    ));
+    let bar = terminal.progress("rendering", plan.n_frames);
+    let memory = plan.write(Memory::new(DEVICE), |done| bar.set_position(done as u64))?;
+    bar.finish_and_clear();
+    let recording = Recording::from_source(Arc::new(memory), &Limits::default())?;
+
+    terminal.say("auditing it as if nothing were known of it\n");
+    let audit = observed(&recording, &Options::new(Method::Auto), terminal)?;
+    let found = wire::Audit::from(&audit);
+    let document = wire::Document::Audit(Box::new(found.clone()));
+    let json = report::to_json(&document);
+    folder.write(&json, &page(&recording, &audit)?)?;
+    let truth = plan.truth();
+    write_atomically(&args.output.join("truth.json"), truth.to_json().as_bytes())?;
+
+    if args.json.json {
+        terminal.result(&json)?;
+    } else {
+        terminal.lines(&report::summary(&audit))?;
+        terminal.result(&beside(&truth, &found, terminal))?;
+    }
+    let flags: Vec<String> = faults.iter().map(|fault| format!("--fault {fault}")).collect();
+    terminal.say(&format!("\nthe report:    {}", file_url(&folder.html())));
+    terminal.say(&format!(
+        "the recording: truedepth simulate --device {DEVICE} {} --frames {} --seed {} -o ipad",
+        flags.join(" "),
+        plan.n_frames,
+        plan.seed
+    ));
+    terminal.say("your own:      truedepth audit REC");
+    if args.open {
+        files::open(&folder.html())?;
+    }
+    Ok(if audit.has_faults() { Outcome::Faults } else { Outcome::Clean })
+}
+
+/// What was put into the simulation beside what came out of the audit.
+fn beside(truth: &Truth, found: &wire::Audit, terminal: &Terminal) -> String {
+    let estimate = |value: Option<f64>, sigma: Option<f64>, decimals: usize| match (value, sigma) {
+        (Some(value), Some(sigma)) => format!("{value:.decimals$} ± {sigma:.decimals$}"),
+        (Some(value), None) => format!("{value:.decimals$}"),
+        (None, _) => "cannot tell".to_owned(),
+    };
+    let calibration = found.calibration.as_ref();
+    let depth = found.depth.as_ref();
+    let rows = [
+        (
+            "focal length, px",
+            format!("{:.2}", truth.camera.focal_px),
+            estimate(
+                calibration.map(|c| c.focal_px),
+                calibration.and_then(|c| c.focal_sigma_px),
+                2,
+            ),
+        ),
+        (
+            "depth scale",
+            format!("{:.4}", 1.0 + truth.depth.scale_excess),
+            estimate(depth.and_then(|d| d.scale), depth.and_then(|d| d.scale_sigma), 4),
+        ),
+        ("stream", truth.camera.stream.clone(), found.distortion_state.clone()),
+    ];
+    let head = format!("{:<18}{:<14}{}", "", "truth", "found");
+    let mut text = format!("\n{}\n", terminal.paint(Tone::Strong, &head));
+    for (name, truth, found) in rows {
+        text.push_str(&format!("{name:<18}{truth:<14}{found}\n"));
+    }
+    text
+}

@@ -1,0 +1,169 @@
+//! Files that leave: never over somebody else's, never half written.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process,
+};
+
+use crate::failure::Failure;
+
+const JSON: &str = "report.json";
+const HTML: &str = "report.html";
+
+/// Every `report.json` of ours says so in its `schema`.
+const SCHEMA: &str = "truedepth.";
+
+/// A folder that may take a report: it is new, empty, or holds an older report of ours.
+#[derive(Debug)]
+pub(crate) struct ReportFolder {
+    path: PathBuf,
+}
+
+impl ReportFolder {
+    /// Refuses a folder with anything in it but an older report of ours.
+    pub(crate) fn new(path: &Path) -> Result<Self, Failure> {
+        let shown = path.display();
+        let refuse = |why: &str| {
+            let message = format!("{shown} {why}; nothing was written");
+            Err(Failure::new(message).hint("name a new folder with -o"))
+        };
+        if path.exists() {
+            if !path.is_dir() {
+                return refuse("is a file, not a folder for a report");
+            }
+            let mut entries = fs::read_dir(path)
+                .map_err(|e| Failure::from(e).within(format!("cannot look into {shown}")))?;
+            if entries.next().is_some() && !is_our_report(&path.join(JSON)) {
+                return refuse("is not empty and holds no report of truedepth");
+            }
+        }
+        Ok(Self { path: path.to_owned() })
+    }
+
+    pub(crate) fn html(&self) -> PathBuf {
+        self.path.join(HTML)
+    }
+
+    /// Writes both files, the machine's first: it marks the folder as ours.
+    pub(crate) fn write(&self, json: &str, html: &str) -> Result<(), Failure> {
+        let shown = self.path.display();
+        fs::create_dir_all(&self.path).map_err(|e| {
+            Failure::from(e)
+                .within(format!("cannot make the folder {shown}"))
+                .hint("name a folder that can be written with -o")
+        })?;
+        write_atomically(&self.path.join(JSON), json.as_bytes())?;
+        write_atomically(&self.path.join(HTML), html.as_bytes())
+    }
+}
+
+/// True for a `report.json` that says it is one of ours.
+fn is_our_report(path: &Path) -> bool {
+    let Ok(text) = fs::read_to_string(path) else { return false };
+    serde_json::from_str::<serde_json::Value>(&text).is_ok_and(|report| {
+        report["schema"].as_str().is_some_and(|schema| schema.starts_with(SCHEMA))
+    })
+}
+
+/// Writes to a neighbour and renames it, so that a reader sees the old file or the new one, never half of one.
+pub(crate) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let shown = path.display();
+    let name = path.file_name().ok_or_else(|| Failure::new(format!("{shown} names no file")))?;
+    let temporary =
+        path.with_file_name(format!(".{}.{}.tmp", name.to_string_lossy(), process::id()));
+    fs::write(&temporary, bytes).and_then(|()| fs::rename(&temporary, path)).map_err(|e| {
+        let _ = fs::remove_file(&temporary); // It may never have come to be.
+        Failure::from(e)
+            .within(format!("cannot write {shown}"))
+            .hint("is the disk full, or the folder not yours to write?")
+    })
+}
+
+/// An address a browser opens, for an existing file.
+pub(crate) fn file_url(path: &Path) -> String {
+    let absolute = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let mut url = String::from("file://");
+    for byte in absolute.to_string_lossy().bytes() {
+        match byte {
+            b'A'..=b'Z' | b'a'..=b'z' | b'0'..=b'9' | b'/' | b'-' | b'_' | b'.' | b'~' => {
+                url.push(char::from(byte));
+            }
+            _ => url.push_str(&format!("%{byte:02X}")),
+        }
+    }
+    url
+}
+
+/// Shows a file with the program the system has for it.
+pub(crate) fn open(path: &Path) -> Result<(), Failure> {
+    let (program, first): (&str, &[&str]) = if cfg!(target_os = "macos") {
+        ("open", &[])
+    } else if cfg!(windows) {
+        ("cmd", &["/C", "start", ""])
+    } else {
+        ("xdg-open", &[])
+    };
+    process::Command::new(program)
+        .args(first)
+        .arg(path)
+        .stdin(process::Stdio::null())
+        .stdout(process::Stdio::null())
+        .stderr(process::Stdio::null())
+        .spawn()
+        .map(|_| ())
+        .map_err(|e| {
+            Failure::from(e)
+                .within(format!("cannot start `{program}` to open {}", path.display()))
+                .hint(format!("open {} in a browser", file_url(path)))
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A folder of this test's own, gone when dropped.
+    struct Scratch(PathBuf);
+
+    impl Scratch {
+        fn new(name: &str) -> Self {
+            let path = std::env::temp_dir().join(format!("truedepth-{}-{name}", process::id()));
+            fs::create_dir_all(&path).unwrap();
+            Self(path)
+        }
+    }
+
+    impl Drop for Scratch {
+        fn drop(&mut self) {
+            fs::remove_dir_all(&self.0).ok();
+        }
+    }
+
+    #[test]
+    fn a_report_replaces_a_report_and_nothing_else() {
+        let scratch = Scratch::new("report");
+        let dir = scratch.0.join("new");
+        let report =
+            |html| ReportFolder::new(&dir)?.write(r#"{"schema":"truedepth.audit/1"}"#, html);
+        report("one").unwrap();
+        report("two").unwrap();
+        assert_eq!(fs::read_to_string(dir.join(HTML)).unwrap(), "two");
+        assert_eq!(fs::read_dir(&dir).unwrap().count(), 2, "no temporary file stays behind");
+
+        for json in ["", "{}", r#"{"schema": 1}"#, r#"{"schema":"else/1"}"#, "no json"] {
+            fs::write(dir.join(JSON), json).unwrap();
+            assert!(ReportFolder::new(&dir).is_err(), "{json}");
+        }
+        fs::remove_file(dir.join(JSON)).unwrap();
+        assert!(report("three").is_err(), "a report.html that may be anyone's");
+        assert_eq!(fs::read_to_string(dir.join(HTML)).unwrap(), "two");
+        assert!(ReportFolder::new(&dir.join(HTML)).is_err(), "a file");
+    }
+
+    #[test]
+    fn urls() {
+        let path = Path::new("/nowhere/a b#ü.html");
+        assert_eq!(file_url(path), "file:///nowhere/a%20b%23%C3%BC.html");
+    }
+}

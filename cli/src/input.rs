@@ -1,0 +1,121 @@
+//! What was named on the command line, opened.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use truedepth::{
+    board::CharucoBoard,
+    camera::Camera,
+    recording::{self, Found, Limits, board_from_toml},
+    report::wire::Document,
+};
+
+use crate::{
+    args::{BoardArgs, BoardArgument},
+    failure::Failure,
+};
+
+/// The recordings in a folder or archive; their metadata are not read yet.
+pub(crate) fn recordings(path: &Path) -> Result<Vec<Found>, Failure> {
+    Ok(recording::discover(path, &Limits::default())?)
+}
+
+/// What can be searched for a board.
+pub(crate) enum Input {
+    /// The recordings in a folder or archive.
+    Recordings(Vec<Found>),
+    /// PNG images, by name.
+    Images(Vec<PathBuf>),
+}
+
+impl Input {
+    /// A folder is the recordings in it, or else its PNG images; a file is an image or an archive by its extension.
+    pub(crate) fn at(path: &Path) -> Result<Self, Failure> {
+        if is_png(path) && path.is_file() {
+            return Ok(Self::Images(vec![path.to_owned()]));
+        }
+        match recording::discover(path, &Limits::default()) {
+            Ok(found) => Ok(Self::Recordings(found)),
+            Err(recording::Error::NotARecording { .. }) if path.is_dir() => {
+                let images = images_in(path)?;
+                if images.is_empty() {
+                    let message =
+                        format!("{} holds neither a recording nor a PNG image", path.display());
+                    return Err(Failure::new(message).hint("name a folder that does, or an image"));
+                }
+                Ok(Self::Images(images))
+            }
+            Err(recording::Error::NotARecording { .. }) => {
+                let message =
+                    format!("{} is neither a PNG image nor a zip archive", path.display());
+                Err(Failure::new(message)
+                    .hint("images of other formats have to be converted to PNG first"))
+            }
+            Err(e) => Err(e.into()),
+        }
+    }
+}
+
+fn is_png(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"))
+}
+
+/// The PNG images of a folder, by name; folders inside are not looked into.
+fn images_in(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let unreadable = |e| Failure::from(e).within(format!("cannot look into {}", folder.display()));
+    let mut images = Vec::new();
+    for entry in fs::read_dir(folder).map_err(unreadable)? {
+        let path = entry.map_err(unreadable)?.path();
+        if is_png(&path) && path.is_file() {
+            images.push(path);
+        }
+    }
+    images.sort();
+    Ok(images)
+}
+
+/// A whole file.
+pub(crate) fn read(path: &Path) -> Result<Vec<u8>, Failure> {
+    fs::read(path).map_err(|e| unreadable(path, e))
+}
+
+fn unreadable(path: &Path, e: std::io::Error) -> Failure {
+    Failure::from(e)
+        .within(format!("cannot read {}", path.display()))
+        .hint("check that it is there, is a file, and that you have the right to read it")
+}
+
+/// The board that was given, if one was.
+pub(crate) fn board(args: &BoardArgs) -> Result<Option<CharucoBoard>, Failure> {
+    match &args.board {
+        None => Ok(None),
+        Some(BoardArgument::Board(board)) => Ok(Some(board.clone())),
+        Some(BoardArgument::File(path)) => {
+            let toml = fs::read_to_string(path).map_err(|e| {
+                unreadable(path, e).hint(
+                    "--board takes a board.toml, or text like 10x8:20.875mm:10.4375mm:ARUCO_ORIGINAL",
+                )
+            })?;
+            Ok(Some(board_from_toml(&path.display().to_string(), &toml)?))
+        }
+    }
+}
+
+/// The camera that `truedepth calibrate --json` or `audit --json` wrote.
+pub(crate) fn camera(path: &Path) -> Result<Camera, Failure> {
+    let hint = "give what `truedepth calibrate REC --json` printed, or the report.json of an audit that calibrated";
+    let wrong = |failure: Failure| {
+        failure.within(format!("{} holds no calibration", path.display())).hint(hint)
+    };
+    let text = fs::read_to_string(path).map_err(|e| unreadable(path, e))?;
+    let calibration = match Document::from_json(&text).map_err(|e| wrong(e.into()))? {
+        Document::Calibrate(calibration) => *calibration,
+        Document::Audit(audit) => {
+            audit.calibration.ok_or_else(|| wrong(Failure::new("this audit did not calibrate")))?
+        }
+        Document::Detect(_) => return Err(wrong(Failure::new("it holds detected corners"))),
+    };
+    calibration.camera().map_err(|e| wrong(e.into()))
+}
