@@ -147,6 +147,20 @@ pub(crate) enum Command {
     Man(ManArgs),
 }
 
+/// How to read recordings and images.
+#[derive(Debug, clap::Args)]
+pub(crate) struct InputArgs {
+    #[command(flatten)]
+    pub(crate) board: BoardArgs,
+
+    /// Read files of any size and number
+    ///
+    /// For recordings you made yourself. Without it, what asks for more than an hour of recording would is refused,
+    /// so that a hostile archive cannot exhaust the memory.
+    #[arg(long)]
+    pub(crate) trust: bool,
+}
+
 /// The board, where the recording does not tell it.
 #[derive(Debug, clap::Args)]
 pub(crate) struct BoardArgs {
@@ -214,7 +228,14 @@ pub(crate) struct AuditArgs {
     pub(crate) method: Method,
 
     #[command(flatten)]
-    pub(crate) board: BoardArgs,
+    pub(crate) input: InputArgs,
+
+    /// What still counts as true, like focal=0.5%; may be given several times
+    ///
+    /// A significant deviation beyond it is a fault. One of focal=1%, depth-scale=1%, depth-bias=3mm and
+    /// distortion=1px (at the corner of the image); these values are the defaults.
+    #[arg(long = "tolerance", value_name = "NAME=VALUE", value_parser = tolerance)]
+    pub(crate) tolerances: Vec<Tolerance>,
 
     /// Take the camera from this file instead of calibrating
     ///
@@ -241,6 +262,36 @@ Examples:
   truedepth calibrate moving --json > camera.json && truedepth audit still --calibration camera.json
   truedepth audit my-recording --json | jq '.findings[] | select(.severity == \"fault\")'";
 
+/// What still counts as true, in the library's units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Tolerance {
+    Focal(f64),
+    DepthScale(f64),
+    DepthBiasM(f64),
+    DistortionPx(f64),
+}
+
+fn tolerance(text: &str) -> Result<Tolerance, String> {
+    const FORMS: &str = "focal=1%, depth-scale=1%, depth-bias=3mm or distortion=1px";
+    let wrong = || format!("write {FORMS}");
+    let (name, value) = text.split_once('=').ok_or_else(wrong)?;
+    let number = |unit: &str| -> Result<f64, String> {
+        let number: f64 =
+            value.strip_suffix(unit).ok_or_else(wrong)?.trim().parse().map_err(|_| wrong())?;
+        if number.is_finite() && number >= 0.0 { Ok(number) } else { Err(wrong()) }
+    };
+    match name {
+        "focal" => Ok(Tolerance::Focal(number("%")? / 100.0)),
+        "depth-scale" => Ok(Tolerance::DepthScale(number("%")? / 100.0)),
+        "depth-bias" => match board::length_m(value) {
+            Ok(bias_m) if bias_m >= 0.0 => Ok(Tolerance::DepthBiasM(bias_m)),
+            _ => Err(wrong()),
+        },
+        "distortion" => Ok(Tolerance::DistortionPx(number("px")?)),
+        _ => Err(wrong()),
+    }
+}
+
 #[derive(Debug, clap::Args)]
 pub(crate) struct CalibrateArgs {
     /// The recording: a folder as the capture app writes it, or a zip of it
@@ -252,7 +303,7 @@ pub(crate) struct CalibrateArgs {
     pub(crate) method: Method,
 
     #[command(flatten)]
-    pub(crate) board: BoardArgs,
+    pub(crate) input: InputArgs,
 
     #[command(flatten)]
     pub(crate) json: JsonArgs,
@@ -271,7 +322,7 @@ pub(crate) struct DetectArgs {
     pub(crate) paths: Vec<PathBuf>,
 
     #[command(flatten)]
-    pub(crate) board: BoardArgs,
+    pub(crate) input: InputArgs,
 
     #[command(flatten)]
     pub(crate) json: JsonArgs,
@@ -426,6 +477,18 @@ mod tests {
             let examples = verb.get_after_help().map(ToString::to_string).unwrap_or_default();
             assert!(examples.contains(&format!("truedepth {name}")), "{name}");
             assert!(verb.get_about().is_some(), "{name}");
+        }
+    }
+
+    #[test]
+    fn tolerances_carry_their_unit() {
+        assert_eq!(tolerance("focal=0.5%"), Ok(Tolerance::Focal(0.005)));
+        assert_eq!(tolerance("depth-bias=2mm"), Ok(Tolerance::DepthBiasM(0.002)));
+        assert_eq!(tolerance("distortion=0.5px"), Ok(Tolerance::DistortionPx(0.5)));
+        for text in
+            ["focal", "focal=1", "focal=-1%", "focal=nan%", "depth-bias=3", "vocal=1%", "focal=1px"]
+        {
+            assert!(tolerance(text).unwrap_err().contains("focal=1%"), "{text}");
         }
     }
 

@@ -2,6 +2,8 @@
 
 use std::error::Error;
 
+use truedepth::{audit, image, recording};
+
 /// Why a verb could not run: a message, what lay behind it, and what to do. Every error of the library turns into one
 /// with `?`.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -32,7 +34,22 @@ impl Failure {
     }
 }
 
-impl<E: Error> From<E> for Failure {
+/// True where a limit on what files may ask for was met.
+fn is_limit(error: &(dyn Error + 'static)) -> bool {
+    let recording = match error.downcast_ref() {
+        Some(audit::Error::Recording(error)) => Some(error),
+        _ => error.downcast_ref(),
+    };
+    matches!(
+        recording,
+        Some(
+            recording::Error::Limit { .. }
+                | recording::Error::Image { source: image::Error::Limits { .. }, .. }
+        )
+    ) || matches!(error.downcast_ref(), Some(image::Error::Limits { .. }))
+}
+
+impl<E: Error + 'static> From<E> for Failure {
     fn from(error: E) -> Self {
         let message = error.to_string();
         let mut causes: Vec<String> = Vec::new();
@@ -45,7 +62,8 @@ impl<E: Error> From<E> for Failure {
             }
             source = cause.source();
         }
-        Self { message, causes, hint: None }
+        let hint = is_limit(&error).then(|| "--trust lifts the limits".to_owned());
+        Self { message, causes, hint }
     }
 }
 

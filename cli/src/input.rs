@@ -8,18 +8,33 @@ use std::{
 use truedepth::{
     board::CharucoBoard,
     camera::Camera,
+    image,
     recording::{self, Found, Limits, board_from_toml},
     report::wire::Document,
 };
 
 use crate::{
-    args::{BoardArgs, BoardArgument},
+    args::{BoardArgs, BoardArgument, InputArgs},
     failure::Failure,
 };
 
+/// What a file may ask for.
+pub(crate) fn limits(args: &InputArgs) -> Limits {
+    if !args.trust {
+        return Limits::default();
+    }
+    // Far beyond any honest recording; still finite, because lengths of hostile files are summed up.
+    Limits {
+        files: 100_000_000,
+        file_bytes: 1 << 40,
+        total_bytes: 1 << 50,
+        image: image::Limits { pixels: 1 << 40 },
+    }
+}
+
 /// The recordings in a folder or archive; their metadata are not read yet.
-pub(crate) fn recordings(path: &Path) -> Result<Vec<Found>, Failure> {
-    Ok(recording::discover(path, &Limits::default())?)
+pub(crate) fn recordings(path: &Path, args: &InputArgs) -> Result<Vec<Found>, Failure> {
+    Ok(recording::discover(path, &limits(args))?)
 }
 
 /// What can be searched for a board.
@@ -32,11 +47,11 @@ pub(crate) enum Input {
 
 impl Input {
     /// A folder is the recordings in it, or else its PNG images; a file is an image or an archive by its extension.
-    pub(crate) fn at(path: &Path) -> Result<Self, Failure> {
+    pub(crate) fn at(path: &Path, args: &InputArgs) -> Result<Self, Failure> {
         if is_png(path) && path.is_file() {
             return Ok(Self::Images(vec![path.to_owned()]));
         }
-        match recording::discover(path, &Limits::default()) {
+        match recording::discover(path, &limits(args)) {
             Ok(found) => Ok(Self::Recordings(found)),
             Err(recording::Error::NotARecording { .. }) if path.is_dir() => {
                 let images = images_in(path)?;

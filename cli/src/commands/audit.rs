@@ -12,7 +12,7 @@ use truedepth::{
 };
 
 use crate::{
-    args::{self, AuditArgs},
+    args::{self, AuditArgs, Tolerance},
     failure::Failure,
     files::{self, ReportFolder},
     input,
@@ -25,7 +25,7 @@ pub(crate) fn run(args: &AuditArgs, terminal: &Terminal) -> Result<Outcome, Fail
     let mut worst = Outcome::Clean;
     let mut found = Vec::new();
     for path in &args.recordings {
-        match input::recordings(path) {
+        match input::recordings(path, &args.input) {
             Ok(inside) => found.extend(inside),
             Err(failure) if args.recordings.len() == 1 => return Err(failure),
             Err(failure) => {
@@ -61,7 +61,15 @@ fn options(args: &AuditArgs) -> Result<Options, Failure> {
         (None, args::Method::Paper) => Method::Paper,
     };
     let mut options = Options::new(method);
-    options.board = input::board(&args.board)?;
+    options.board = input::board(&args.input.board)?;
+    for tolerance in &args.tolerances {
+        match *tolerance {
+            Tolerance::Focal(fraction) => options.tolerances.focal = fraction,
+            Tolerance::DepthScale(fraction) => options.tolerances.depth_scale = fraction,
+            Tolerance::DepthBiasM(bias_m) => options.tolerances.depth_bias_m = bias_m,
+            Tolerance::DistortionPx(px) => options.tolerances.distortion_px = px,
+        }
+    }
     Ok(options)
 }
 

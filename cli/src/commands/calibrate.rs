@@ -2,7 +2,7 @@
 
 use truedepth::{
     audit::{Method, Options},
-    recording::{Limits, Recording},
+    recording::Recording,
     report::{self, wire},
 };
 
@@ -20,8 +20,8 @@ pub(crate) fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome, 
         args::Method::Auto => Method::Auto,
         args::Method::Paper => Method::Paper,
     });
-    options.board = input::board(&args.board)?;
-    let recording = Recording::open(&args.recording, &Limits::default())?;
+    options.board = input::board(&args.input.board)?;
+    let recording = Recording::open(&args.recording, &input::limits(&args.input))?;
     let audit = observed(&recording, &options, terminal)?;
     let why = audit.no_calibration.clone();
     let Some(calibration) = wire::Audit::from(&audit).calibration else {

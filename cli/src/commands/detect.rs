@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use truedepth::{
     board::CharucoBoard,
     detect::Detector,
-    image::{Gray, Limits},
+    image::Gray,
     recording::Recording,
     report::{
         self,
@@ -23,7 +23,7 @@ use crate::{
 };
 
 pub(crate) fn run(args: &DetectArgs, terminal: &Terminal) -> Result<Outcome, Failure> {
-    let board = input::board(&args.board)?;
+    let board = input::board(&args.input.board)?;
     let mut images = Vec::new();
     let mut outcome = Outcome::Clean;
     for path in &args.paths {
@@ -68,7 +68,7 @@ fn searched(
         Failure::new(format!("{what}: the board is not known"))
             .hint("say which with --board, like --board 10x8:20.875mm:10.4375mm:ARUCO_ORIGINAL")
     };
-    match Input::at(path)? {
+    match Input::at(path, &args.input)? {
         Input::Recordings(found) => {
             let mut all = Vec::new();
             for found in found {
@@ -88,7 +88,7 @@ fn searched(
                 .map(|file| {
                     let image = timed(&file.display().to_string(), &detector, args, || {
                         let bytes = input::read(file)?;
-                        Gray::from_png(&bytes, &Limits::default()).map_err(|e| {
+                        Gray::from_png(&bytes, &input::limits(&args.input).image).map_err(|e| {
                             Failure::from(e).within(format!("cannot read {}", file.display()))
                         })
                     });

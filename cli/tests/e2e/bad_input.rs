@@ -161,7 +161,7 @@ fn a_zip_bomb() {
     let files: Vec<_> = files.iter().map(|(n, b)| (n.as_str(), b.as_slice())).collect();
     let path = scratch.write("bomb.zip", zip(&files));
     assert!(fs::metadata(&path).expect("written").len() < 1 << 20, "it is small");
-    refused(&path, &["bomb.zip", "rgb_1500.png", "limit"]);
+    refused(&path, &["bomb.zip", "rgb_1500.png", "limit", "hint: --trust"]);
 }
 
 #[test]
