@@ -2,7 +2,7 @@
 
 use std::io::{Cursor, ErrorKind};
 
-use super::{DepthMap, Gray, Rgb, rgb::luma};
+use super::{DepthMap, Gray, Rgb, rgb::luma, unfiltered::Rows};
 
 /// What an untrusted image may ask for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,23 +44,19 @@ impl Gray {
     /// Decodes a PNG of any colour type and bit depth to grey: colours by their luma as [`Rgb::to_gray`], 16 bits by
     /// their higher byte, alpha dropped. Checksums are verified to the last byte.
     pub fn from_png(bytes: &[u8], limits: &Limits) -> Result<Self, Error> {
-        let (width, height, pixels) = decode(bytes, limits, Samples::Eight, |color| {
-            Ok(match color {
-                png::ColorType::Grayscale => Box::new(|row, out| out.extend_from_slice(row)),
-                png::ColorType::GrayscaleAlpha => Box::new(|row: &[u8], out: &mut Vec<u8>| {
+        let (width, height, pixels) =
+            decode_eight_bits(bytes, limits, |channels| match channels {
+                1 => |row: &[u8], out: &mut Vec<u8>| out.extend_from_slice(row),
+                2 => |row: &[u8], out: &mut Vec<u8>| {
                     out.extend(row.as_chunks::<2>().0.iter().map(|&[gray, _]| gray));
-                }),
-                png::ColorType::Rgba => Box::new(|row: &[u8], out: &mut Vec<u8>| {
+                },
+                3 => |row: &[u8], out: &mut Vec<u8>| {
+                    out.extend(row.as_chunks::<3>().0.iter().map(|&rgb| luma(rgb)));
+                },
+                _ => |row: &[u8], out: &mut Vec<u8>| {
                     out.extend(row.as_chunks::<4>().0.iter().map(|&[r, g, b, _]| luma([r, g, b])));
-                }),
-                // The decoder has already looked up palettes.
-                png::ColorType::Rgb | png::ColorType::Indexed => {
-                    Box::new(|row: &[u8], out: &mut Vec<u8>| {
-                        out.extend(row.as_chunks::<3>().0.iter().map(|&rgb| luma(rgb)));
-                    })
-                }
-            })
-        })?;
+                },
+            })?;
         Ok(Self::new(width, height, pixels))
     }
 
@@ -75,24 +71,21 @@ impl Rgb {
     /// Decodes a PNG of any colour type and bit depth: grey becomes three equal channels, 16 bits their higher byte,
     /// alpha is dropped. Checksums are verified to the last byte.
     pub fn from_png(bytes: &[u8], limits: &Limits) -> Result<Self, Error> {
-        let (width, height, pixels) = decode(bytes, limits, Samples::Eight, |color| {
-            Ok(match color {
-                png::ColorType::Grayscale => Box::new(|row: &[u8], out: &mut Vec<[u8; 3]>| {
-                    out.extend(row.iter().map(|&gray| [gray; 3]));
-                }),
-                png::ColorType::GrayscaleAlpha => Box::new(|row: &[u8], out: &mut Vec<[u8; 3]>| {
+        let (width, height, pixels) =
+            decode_eight_bits(bytes, limits, |channels| match channels {
+                1 => |row: &[u8], out: &mut Vec<[u8; 3]>| {
+                    out.extend(row.iter().map(|&gray| [gray; 3]))
+                },
+                2 => |row: &[u8], out: &mut Vec<[u8; 3]>| {
                     out.extend(row.as_chunks::<2>().0.iter().map(|&[gray, _]| [gray; 3]));
-                }),
-                png::ColorType::Rgba => Box::new(|row: &[u8], out: &mut Vec<[u8; 3]>| {
+                },
+                3 => |row: &[u8], out: &mut Vec<[u8; 3]>| {
+                    out.extend_from_slice(row.as_chunks::<3>().0)
+                },
+                _ => |row: &[u8], out: &mut Vec<[u8; 3]>| {
                     out.extend(row.as_chunks::<4>().0.iter().map(|&[r, g, b, _]| [r, g, b]));
-                }),
-                png::ColorType::Rgb | png::ColorType::Indexed => {
-                    Box::new(|row: &[u8], out: &mut Vec<[u8; 3]>| {
-                        out.extend_from_slice(row.as_chunks::<3>().0);
-                    })
-                }
-            })
-        })?;
+                },
+            })?;
         Ok(Self::new(width, height, pixels))
     }
 
@@ -138,6 +131,23 @@ impl DepthMap {
         let size = (self.width(), self.height());
         encode(size, png::ColorType::Grayscale, png::BitDepth::Sixteen, counts.as_flattened())
     }
+}
+
+/// Width, height and pixels of an image of any kind. `convert` tells how a row of 8-bit samples with so many channels
+/// (grey, grey and alpha, RGB, RGBA) becomes pixels.
+fn decode_eight_bits<T: Clone + 'static>(
+    bytes: &[u8],
+    limits: &Limits,
+    convert: impl Fn(usize) -> fn(&[u8], &mut Vec<T>),
+) -> Result<(usize, usize, Vec<T>), Error> {
+    if let Some(rows) = Rows::decode(bytes, limits.pixels) {
+        let append = convert(rows.channels);
+        let mut pixels = Vec::with_capacity(rows.width * rows.height);
+        rows.iter().for_each(|row| append(row, &mut pixels));
+        return Ok((rows.width, rows.height, pixels));
+    }
+    // The decoder looks palettes up, so that what it hands over never is one.
+    decode(bytes, limits, Samples::Eight, |color| Ok(Box::new(convert(color.samples()))))
 }
 
 /// What the rows handed to a [`Convert`] hold.

@@ -9,6 +9,7 @@ mod codec;
 mod depth_map;
 mod gray;
 mod rgb;
+mod unfiltered;
 
 pub use codec::{Error, Limits};
 pub use depth_map::DepthMap;
