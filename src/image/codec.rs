@@ -2,7 +2,7 @@
 
 use std::io::{Cursor, ErrorKind};
 
-use super::{DepthMap, Gray, Rgb, rgb::luma, unfiltered::Rows};
+use super::{DepthMap, Gray, Rgb, rgb::luma, unfiltered};
 
 /// What an untrusted image may ask for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -140,11 +140,8 @@ fn decode_eight_bits<T: Clone + 'static>(
     limits: &Limits,
     convert: impl Fn(usize) -> fn(&[u8], &mut Vec<T>),
 ) -> Result<(usize, usize, Vec<T>), Error> {
-    if let Some(rows) = Rows::decode(bytes, limits.pixels) {
-        let append = convert(rows.channels);
-        let mut pixels = Vec::with_capacity(rows.width * rows.height);
-        rows.iter().for_each(|row| append(row, &mut pixels));
-        return Ok((rows.width, rows.height, pixels));
+    if let Some(image) = unfiltered::decode(bytes, limits.pixels, &convert) {
+        return Ok(image);
     }
     // The decoder looks palettes up, so that what it hands over never is one.
     decode(bytes, limits, Samples::Eight, |color| Ok(Box::new(convert(color.samples()))))

@@ -10,75 +10,86 @@ use flate2::{Decompress, FlushDecompress, Status};
 /// more is lying.
 const MAX_RATIO: usize = 1032;
 
-/// The pixels of a PNG, each row after one byte to be skipped.
-pub(super) struct Rows {
-    pub(super) width: usize,
-    pub(super) height: usize,
-    /// Grey, grey and alpha, RGB or RGBA.
-    pub(super) channels: usize,
-    bytes: Vec<u8>,
+/// Bytes inflated at once: much more than the 32 KiB that the decompressor then puts aside, little enough to be still
+/// in the cache when the rows become pixels.
+const PIECE_BYTES: usize = 256 << 10;
+
+/// Width, height and pixels; `convert` tells how a row of 8-bit samples with so many channels (grey, grey and alpha,
+/// RGB, RGBA) becomes pixels.
+///
+/// `None` for every file that is not simple, sound in all its checksums, and of at most `max_pixels`: what the
+/// general decoder has to say about it, image or error, counts.
+pub(super) fn decode<T>(
+    png: &[u8],
+    max_pixels: u64,
+    convert: impl Fn(usize) -> fn(&[u8], &mut Vec<T>),
+) -> Option<(usize, usize, Vec<T>)> {
+    let mut chunks = Chunks(png.strip_prefix(b"\x89PNG\r\n\x1a\n")?);
+    let (b"IHDR", header) = chunks.next()? else { return None };
+    let (&width, header) = header.split_first_chunk::<4>()?;
+    let (&height, header) = header.split_first_chunk::<4>()?;
+    let [width, height] = [width, height].map(u32::from_be_bytes);
+    if width == 0 || height == 0 || u64::from(width) * u64::from(height) > max_pixels {
+        return None;
+    }
+    // Bit depth, colour type, compression, filter method, interlacing.
+    let channels = match *header {
+        [8, 0, 0, 0, 0] => 1,
+        [8, 4, 0, 0, 0] => 2,
+        [8, 2, 0, 0, 0] => 3,
+        [8, 6, 0, 0, 0] => 4,
+        _ => return None,
+    };
+    let (width, height) = (width as usize, height as usize);
+    let row_bytes = width.checked_mul(channels)?.checked_add(1)?;
+    if row_bytes.checked_mul(height)? / MAX_RATIO > png.len() {
+        return None;
+    }
+    let data = compressed(png.len(), chunks)?;
+
+    let append = convert(channels);
+    let mut pixels = Vec::with_capacity(width * height);
+    let mut inflate = Decompress::new(true);
+    let mut piece = vec![0; (PIECE_BYTES / row_bytes).clamp(1, height) * row_bytes];
+    let mut n_rows = 0;
+    while n_rows < height {
+        // Filters, if any, show in the first row: taken alone, little time is lost on the wrong way.
+        let rows = if n_rows == 0 { 1 } else { (piece.len() / row_bytes).min(height - n_rows) };
+        let piece = &mut piece[..rows * row_bytes];
+        let (before, rest) = (inflate.total_out(), &data[inflate.total_in() as usize..]);
+        inflate.decompress(rest, piece, FlushDecompress::None).ok()?;
+        if (inflate.total_out() - before) as usize != piece.len() {
+            return None;
+        }
+        for row in piece.chunks_exact(row_bytes) {
+            let (0, samples) = row.split_first()? else { return None };
+            append(samples, &mut pixels);
+        }
+        n_rows += rows;
+    }
+    // Nothing may follow but the checksum.
+    let rest = &data[inflate.total_in() as usize..];
+    let n_bytes = inflate.total_out();
+    let status = inflate.decompress(rest, &mut [0], FlushDecompress::Finish).ok()?;
+    let whole = inflate.total_in() as usize == data.len() && inflate.total_out() == n_bytes;
+    (whole && status == Status::StreamEnd).then_some((width, height, pixels))
 }
 
-impl Rows {
-    /// `None` for every file that is not simple, sound in all its checksums, and of at most `max_pixels`: what the
-    /// general decoder has to say about it, image or error, counts.
-    pub(super) fn decode(png: &[u8], max_pixels: u64) -> Option<Self> {
-        let mut chunks = Chunks(png.strip_prefix(b"\x89PNG\r\n\x1a\n")?);
-        let (b"IHDR", header) = chunks.next()? else { return None };
-        let (&width, header) = header.split_first_chunk::<4>()?;
-        let (&height, header) = header.split_first_chunk::<4>()?;
-        let [width, height] = [width, height].map(u32::from_be_bytes);
-        if width == 0 || height == 0 || u64::from(width) * u64::from(height) > max_pixels {
-            return None;
-        }
-        // Bit depth, colour type, compression, filter method, interlacing.
-        let channels = match *header {
-            [8, 0, 0, 0, 0] => 1,
-            [8, 4, 0, 0, 0] => 2,
-            [8, 2, 0, 0, 0] => 3,
-            [8, 6, 0, 0, 0] => 4,
+/// The compressed pixels in one piece, for one sound PNG image.
+fn compressed(capacity: usize, chunks: Chunks<'_>) -> Option<Vec<u8>> {
+    let mut data = Vec::with_capacity(capacity);
+    let mut after_pixels = false;
+    for (kind, content) in chunks {
+        match (kind, content) {
+            (b"IDAT", content) if !after_pixels => data.extend_from_slice(content),
+            (b"IEND", []) => return Some(data),
+            // Transparency and animation change what the pixels mean; unknown critical chunks may.
+            (b"tRNS" | b"acTL" | b"fcTL" | b"fdAT", _) => return None,
+            ([b'a'..=b'z', ..], _) => after_pixels = !data.is_empty(),
             _ => return None,
-        };
-        let (width, height) = (width as usize, height as usize);
-        let row_bytes = width.checked_mul(channels)?.checked_add(1)?;
-        let n_bytes = row_bytes.checked_mul(height)?;
-        if n_bytes / MAX_RATIO > png.len() {
-            return None;
         }
-
-        let mut pixels = Vec::with_capacity(png.len());
-        let mut after_pixels = false;
-        loop {
-            match chunks.next()? {
-                (b"IDAT", data) if !after_pixels => pixels.extend_from_slice(data),
-                (b"IEND", []) => break,
-                // Transparency and animation change what the pixels mean; unknown critical chunks may.
-                (b"tRNS" | b"acTL" | b"fcTL" | b"fdAT", _) => return None,
-                ([b'a'..=b'z', ..], _) => after_pixels = !pixels.is_empty(),
-                _ => return None,
-            }
-        }
-        let mut bytes = vec![0; n_bytes];
-        let mut inflate = Decompress::new(true);
-        // Filters, if any, show in the first row: then no time is lost on the wrong way.
-        inflate.decompress(&pixels, &mut bytes[..1], FlushDecompress::None).ok()?;
-        if bytes[0] != 0 || inflate.total_out() != 1 {
-            return None;
-        }
-        let rest = &pixels[inflate.total_in() as usize..];
-        let status = inflate.decompress(rest, &mut bytes[1..], FlushDecompress::Finish).ok()?;
-        let whole = inflate.total_in() as usize == pixels.len();
-        if status != Status::StreamEnd || inflate.total_out() as usize != n_bytes || !whole {
-            return None;
-        }
-        let unfiltered = bytes.chunks_exact(row_bytes).all(|row| row[0] == 0);
-        unfiltered.then_some(Self { width, height, channels, bytes })
     }
-
-    /// The rows in order, samples only.
-    pub(super) fn iter(&self) -> impl Iterator<Item = &[u8]> {
-        self.bytes.chunks_exact(self.width * self.channels + 1).map(|row| &row[1..])
-    }
+    None
 }
 
 /// The chunks of a PNG after its signature, kind and content, up to the first whose checksum is wrong.
@@ -122,11 +133,15 @@ mod tests {
     }
 
     fn deflate(bytes: &[u8]) -> Vec<u8> {
-        let mut out = Vec::with_capacity(bytes.len() + 100);
+        let mut out = Vec::with_capacity(2 * bytes.len() + 100);
         flate2::Compress::new(flate2::Compression::fast(), true)
             .compress_vec(bytes, &mut out, flate2::FlushCompress::Finish)
             .unwrap();
         out
+    }
+
+    fn taken_of(png: &[u8], max_pixels: u64) -> bool {
+        decode(png, max_pixels, |_| |row: &[u8], out| out.push(row.len())).is_some()
     }
 
     const HEADER: [u8; 13] = [0, 0, 0, 2, 0, 0, 0, 2, 8, 6, 0, 0, 0];
@@ -168,19 +183,38 @@ mod tests {
             ("16 bits", png(deep, &[(b"IDAT", &data)]), false),
             ("a lying header", png(large, &[(b"IDAT", &data)]), false),
         ] {
-            assert_eq!(Rows::decode(&bytes, 1 << 40).is_some(), taken, "{what}");
+            assert_eq!(taken_of(&bytes, 1 << 40), taken, "{what}");
             if taken {
-                assert!(Rows::decode(&bytes, 3).is_none(), "{what}");
+                assert!(!taken_of(&bytes, 3), "{what}");
                 assert_eq!(Rgb::from_png(&bytes, &Limits::default()).unwrap(), expected, "{what}");
                 for n in 0..bytes.len() {
-                    assert!(Rows::decode(&bytes[..n], 1 << 40).is_none(), "{what}, {n} bytes");
+                    assert!(!taken_of(&bytes[..n], 1 << 40), "{what}, {n} bytes");
                 }
                 for i in 0..bytes.len() {
                     let mut flipped = bytes.clone();
                     flipped[i] ^= 4;
-                    assert!(Rows::decode(&flipped, 1 << 40).is_none(), "{what}, byte {i}");
+                    assert!(!taken_of(&flipped, 1 << 40), "{what}, byte {i}");
                 }
             }
+        }
+    }
+
+    /// More than one piece, and rows longer than a piece.
+    #[test]
+    fn large_images() {
+        for (width, height) in [(640, 480), (300_000, 3), (3, 100_000)] {
+            let samples = (0..width * height).map(|i: usize| (i * i >> 7) as u8);
+            let gray = Gray::new(width, height, samples.collect());
+            let rows = gray.pixels().chunks(width);
+            let bytes: Vec<u8> =
+                rows.flat_map(|row| [0].into_iter().chain(row.iter().copied())).collect();
+            let mut header = HEADER;
+            header[..4].copy_from_slice(&(width as u32).to_be_bytes());
+            header[4..8].copy_from_slice(&(height as u32).to_be_bytes());
+            header[9] = 0;
+            let png = png(header, &[(b"IDAT", &deflate(&bytes))]);
+            assert!(taken_of(&png, 1 << 40), "{width}x{height}");
+            assert!(Gray::from_png(&png, &Limits::default()).unwrap() == gray, "{width}x{height}");
         }
     }
 
@@ -191,7 +225,7 @@ mod tests {
             let mut header = HEADER;
             (header[7], header[9]) = (1, color);
             let bytes = png(header, &[(b"IDAT", &deflate(&row))]);
-            assert!(Rows::decode(&bytes, 2).is_some(), "{channels} channels");
+            assert!(taken_of(&bytes, 2), "{channels} channels");
             // The general decoder sees the same once a filter keeps the file from the fast way: Sub, then undone.
             let mut sub = row.clone();
             sub[0] = 1;
@@ -199,7 +233,7 @@ mod tests {
                 sub[i] -= sub[i - usize::from(channels)];
             }
             let other = png(header, &[(b"IDAT", &deflate(&sub))]);
-            assert!(Rows::decode(&other, 2).is_none());
+            assert!(!taken_of(&other, 2));
             let limits = Limits::default();
             assert_eq!(
                 Gray::from_png(&bytes, &limits).unwrap(),
