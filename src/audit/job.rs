@@ -5,10 +5,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use super::{Method, Options, Progress, Stage};
 use crate::{
     board::{CharucoBoard, Layout},
-    calibrate::Calibration,
+    calibrate::{self, Calibration, FrameCorners, RejectedFrame, Rejection},
     camera::{Camera, Distortion},
     depth::{BoardDepth, against_board, sense},
-    detect::{Detector, Observation},
+    detect::{Corner, Detector, Observation},
     diagnose::{Case, Device, DistortionState, Finding, Verdict, diagnose},
     pose::{View, Weighting},
     recording::{self, Factory, Problem, Recording},
@@ -183,7 +183,7 @@ pub fn audit_observed(
     let factory = recording.factory().cloned();
 
     observer(Progress { stage: Stage::Calibrate, done: 0, total: 1 });
-    let own = own_camera(recording, options, &board, &frames, factory.as_ref(), size_px)?;
+    let own = own_camera(recording, &options.method, &board, &frames)?;
     observer(Progress { stage: Stage::Calibrate, done: 1, total: 1 });
 
     observer(Progress { stage: Stage::Judge, done: 0, total: 1 });
@@ -197,11 +197,7 @@ pub fn audit_observed(
             let camera = Camera { intrinsics, distortion: Distortion::None };
             View::from_corners(index, &board, &camera, corners, Weighting::Equal).ok()
         });
-        let weighting = Weighting::Sigma { floor_px: CORNER_FLOOR_PX };
-        frame.own_view = own
-            .camera
-            .as_ref()
-            .and_then(|camera| View::from_corners(index, &board, camera, corners, weighting).ok());
+        frame.own_view = own.view(index, &board, corners);
     }
     let factory_depth =
         factory.is_some().then(|| compare(&board, &frames, |f| f.factory_view.as_ref()));
@@ -331,12 +327,26 @@ fn compare<'a>(
     frames: &'a [FrameAudit],
     view: impl Fn(&'a FrameAudit) -> Option<&'a View>,
 ) -> BoardDepth {
-    let views: Vec<_> = frames
+    let sensed: Vec<_> = frames
         .iter()
-        .filter(|f| !f.sensor_m.is_empty())
-        .filter_map(|f| Some((view(f)?, f.sensor_m.as_slice())))
+        .filter(|frame| !frame.sensor_m.is_empty())
+        .filter_map(|frame| {
+            let view = view(frame)?;
+            // A view may have left out corners of the observation; both are in order of ids.
+            let mut seen = frame.observation.corners.iter().zip(&frame.sensor_m);
+            let sensor_m: Vec<_> = view
+                .corners
+                .iter()
+                .map(|corner| {
+                    seen.find(|(seen, _)| seen.id == corner.id).and_then(|(_, depth)| *depth)
+                })
+                .collect();
+            Some((view, sensor_m))
+        })
         .collect();
-    against_board(board, &views)
+    let pairs: Vec<_> =
+        sensed.iter().map(|(view, sensor_m)| (*view, sensor_m.as_slice())).collect();
+    against_board(board, &pairs)
 }
 
 /// The own camera, or why there is none.
@@ -347,20 +357,97 @@ struct Own {
     why_not: Option<String>,
 }
 
+impl Own {
+    /// The board's pose in a frame with the own camera, corners left out that disagree with all others.
+    fn view(&self, index: usize, board: &CharucoBoard, corners: &[Corner]) -> Option<View> {
+        let camera = self.camera.as_ref()?;
+        let mut corners = corners.to_vec();
+        if let Some(calibration) = &self.calibration {
+            let disagrees = |r: &RejectedFrame| {
+                r.frame == index && matches!(r.reason, Rejection::Disagrees { .. })
+            };
+            if calibration.rejected.iter().any(disagrees) {
+                return None;
+            }
+            corners
+                .retain(|c| !calibration.outliers.iter().any(|o| o.frame == index && o.id == c.id));
+        }
+        let weighting = Weighting::Sigma { floor_px: CORNER_FLOOR_PX };
+        View::from_corners(index, board, camera, &corners, weighting).ok()
+    }
+}
+
 fn own_camera(
     recording: &Recording,
-    options: &Options,
-    _board: &CharucoBoard,
-    _frames: &[FrameAudit],
-    _factory: Option<&Factory>,
-    size_px: Option<[usize; 2]>,
+    method: &Method,
+    board: &CharucoBoard,
+    frames: &[FrameAudit],
 ) -> Result<Own, Error> {
-    if let Method::Given(camera) = &options.method {
-        let given = [camera.intrinsics.width, camera.intrinsics.height];
-        if let Some(size) = size_px.filter(|size| *size != given) {
-            return Err(Error::CameraSize { recording: recording.place().to_owned(), given, size });
+    let size_px = frames.iter().find_map(|f| f.size_px);
+    let method = match method {
+        Method::Given(camera) => {
+            let given = [camera.intrinsics.width, camera.intrinsics.height];
+            if let Some(size) = size_px.filter(|size| *size != given) {
+                return Err(Error::CameraSize {
+                    recording: recording.place().to_owned(),
+                    given,
+                    size,
+                });
+            }
+            return Ok(Own { camera: Some((**camera).clone()), ..Own::default() });
         }
-        return Ok(Own { camera: Some((**camera).clone()), ..Own::default() });
+        Method::Paper => calibrate::Method::Paper,
+        Method::Auto => calibrate::Method::Auto,
+    };
+    let why_not = |why: String| Ok(Own { why_not: Some(why), ..Own::default() });
+    let frames: Vec<FrameCorners> = frames
+        .iter()
+        .enumerate()
+        .filter(|(_, frame)| !frame.observation.corners.is_empty())
+        .map(|(index, frame)| FrameCorners {
+            frame: index,
+            corners: frame.observation.corners.clone(),
+        })
+        .collect();
+    if frames.is_empty() {
+        return why_not("the board was not seen in any frame".to_owned());
     }
-    Ok(Own { why_not: Some("no calibration".to_owned()), ..Own::default() })
+    let Some(factory) = recording.factory() else {
+        return why_not("the recording has no factory intrinsics to start from".to_owned());
+    };
+    let input = calibrate::Input {
+        board,
+        factory: &factory.intrinsics,
+        tables: factory.tables.as_ref(),
+        frames: &frames,
+    };
+    match calibrate::calibrate(&input, method) {
+        Ok(calibration) => Ok(Own {
+            camera: Some(calibration.camera.clone()),
+            calibration: Some(calibration),
+            why_not: None,
+        }),
+        Err(error) => why_not(why_not_calibrated(&error)),
+    }
+}
+
+/// For the end of a sentence. Findings tell the remedy themselves.
+fn why_not_calibrated(error: &calibrate::Error) -> String {
+    match error {
+        calibrate::Error::TooFewViews { n_frames, n_views, needed, min_corners } => format!(
+            "{n_views} of {n_frames} frames with the board are of use for a calibration (at least {min_corners} corners, \
+             spread in both directions, from a place of their own), and it takes {needed}"
+        ),
+        calibrate::Error::Underdetermined { n_views, n_pictures, max_tilt_deg, focal_px } => {
+            format!(
+                "the {n_views} views of the board ({n_pictures} different, tilted by at most {max_tilt_deg:.0} degrees) do not \
+             determine a focal length{}",
+                focal_px.map_or(String::new(), |f| format!(
+                    ", which comes out as {:.0} +- {:.0} px",
+                    f.value, f.sigma
+                ))
+            )
+        }
+        other => other.to_string(),
+    }
 }

@@ -58,6 +58,10 @@ fn same_optimum_as_opencv() {
             assert!(model != Model::Brown);
         }
         // An optimum: no worse than theirs to far below what both print.
-        assert!(ours.rms_px <= number(&theirs["rms_px"]) + 1e-9, "{name}: {} {theirs}", ours.rms_px);
+        assert!(
+            ours.rms_px <= number(&theirs["rms_px"]) + 1e-9,
+            "{name}: {} {theirs}",
+            ours.rms_px
+        );
     }
 }

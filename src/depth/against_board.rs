@@ -1,8 +1,14 @@
 //! The error of every corner, frame by frame.
 
 use crate::{
-    board::CharucoBoard, calibrate::Estimate, depth::DepthLine, detect::Corner, geom::Pixel,
-    image::DepthMap, pose::View,
+    board::CharucoBoard,
+    calibrate::Estimate,
+    depth::DepthLine,
+    detect::Corner,
+    geom::Pixel,
+    image::DepthMap,
+    pose::View,
+    solve::{mean, median, standard_error},
 };
 
 /// Errors beyond this are dropped before medians are taken, as in the paper's code: the sensor then saw something
@@ -78,7 +84,7 @@ pub fn against_board(board: &CharucoBoard, views: &[(&View, &[Option<f64>])]) ->
         views.iter().map(|(view, sensed)| frame_depth(board, view, sensed)).collect();
     let medians: Vec<f64> = frames.iter().filter_map(|f| f.median_error_m).collect();
     let line = DepthLine::fit(board, &frames);
-    BoardDepth { frames, mean_of_medians_m: mean(&medians), line }
+    BoardDepth { frames, mean_of_medians_m: mean_of(&medians), line }
 }
 
 fn frame_depth(board: &CharucoBoard, view: &View, sensed: &[Option<f64>]) -> FrameDepth {
@@ -102,28 +108,17 @@ fn frame_depth(board: &CharucoBoard, view: &View, sensed: &[Option<f64>]) -> Fra
         FrameDepth { frame: view.frame, samples, n_holes, n_beyond: 0, median_error_m: None };
     let errors: Vec<f64> = frame.kept().map(Sample::error_m).collect();
     frame.n_beyond = frame.samples.len() - errors.len();
-    frame.median_error_m = median(errors);
+    frame.median_error_m = (!errors.is_empty()).then(|| median(&errors));
     frame
 }
 
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    if values.is_empty() {
-        return None;
-    }
-    values.sort_by(f64::total_cmp);
-    let n = values.len();
-    Some(f64::midpoint(values[(n - 1) / 2], values[n / 2]))
-}
-
-fn mean(values: &[f64]) -> Option<Estimate> {
-    let n = values.len() as f64;
-    if values.is_empty() {
-        return None;
-    }
-    let value = values.iter().sum::<f64>() / n;
-    let variance = values.iter().map(|v| (v - value).powi(2)).sum::<f64>() / (n - 1.0);
-    let sigma = if values.len() > 1 { (variance / n).sqrt() } else { f64::INFINITY };
-    Some(Estimate { value, sigma })
+fn mean_of(medians: &[f64]) -> Option<Estimate> {
+    let sigma = match medians.len() {
+        0 => return None,
+        1 => f64::INFINITY,
+        _ => standard_error(medians),
+    };
+    Some(Estimate { value: mean(medians), sigma })
 }
 
 #[cfg(test)]

@@ -52,6 +52,17 @@ const TUKEY: f64 = 4.685;
 const SIGMA_FROM_MAD: f64 = 1.4826;
 
 impl DepthLine {
+    /// Sensor minus board at this depth of the board, metres, as the line has it.
+    ///
+    /// The sigma takes offset and slope as independent: they are so at `center_m`, where all samples weigh the same.
+    pub fn error_at_m(&self, board_m: f64) -> Estimate {
+        let from_center_m = board_m - self.center_m;
+        Estimate {
+            value: self.offset_m.value + (self.scale.value - 1.0) * from_center_m,
+            sigma: self.offset_m.sigma.hypot(self.scale.sigma * from_center_m),
+        }
+    }
+
     /// `None` for fewer than 20 samples, fewer than 3 frames, or less than 0.1 mm between the nearest and the
     /// farthest corner.
     pub(super) fn fit(board: &CharucoBoard, frames: &[FrameDepth]) -> Option<Self> {

@@ -23,18 +23,20 @@ impl Verdict {
     ///
     /// ```text
     /// |v| > 3σ and |v| > tolerance        fault
-    /// |v| + 3σ ≤ tolerance                info where |v| > 3σ, ok otherwise
+    /// |v| + 2σ ≤ tolerance                info where |v| > 3σ, ok otherwise
     /// anything else                       unknown
     /// ```
     ///
-    /// A significant deviation within the tolerance whose interval reaches beyond it is *unknown*, too: "ok" must
-    /// mean that a fault would have been seen. What is not a number is *unknown*.
+    /// A deviation within the tolerance whose interval reaches beyond it is *unknown*, too: "ok" must mean that a fault
+    /// would have been seen. Two sigmas make that sure to 97.7 %, since only one side counts. What is not a number is
+    /// *unknown*.
     pub fn of(deviation: Estimate, tolerance: f64) -> Self {
-        let (size, spread) = (deviation.value.abs(), 3.0 * deviation.sigma);
-        if size > spread && size > tolerance {
+        let (size, sigma) = (deviation.value.abs(), deviation.sigma);
+        let significant = size > 3.0 * sigma;
+        if significant && size > tolerance {
             Self::Fault
-        } else if size + spread <= tolerance {
-            if size > spread { Self::Info } else { Self::Ok }
+        } else if size + 2.0 * sigma <= tolerance {
+            if significant { Self::Info } else { Self::Ok }
         } else {
             Self::Unknown
         }

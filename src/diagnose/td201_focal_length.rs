@@ -29,6 +29,11 @@ impl Measured {
     pub(super) fn relative_sigma(&self) -> f64 {
         self.focal_px.sigma / self.focal_px.value
     }
+
+    /// True where the own camera's focal length makes up for a distortion it does not know.
+    pub(super) fn own_camera_ignores_distortion(&self) -> bool {
+        self.origin == Origin::DistortionTakenOut
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,8 +63,7 @@ pub(super) fn measure(
             split_half_sigma_px: None,
         });
     };
-    let formal =
-        calibration.parameters.iter().find(|p| p.name == "focal_px").map(|p| p.estimate.sigma);
+    let formal = calibration.parameter("focal_px").map(|f| f.sigma);
     // Each half has √2 the sigma of the whole, their difference twice: half of it is one draw of the whole's error.
     let split_half = calibration.split_half_focal_px.map(|[a, b]| (a.value - b.value).abs() / 2.0);
     let pinhole = &camera.intrinsics;

@@ -15,32 +15,63 @@ pub(super) const RECORD: &str = "Record the board at several distances (0.2 m to
 pub(super) struct Scaled {
     /// Scale minus one, from the slope over distance.
     pub(super) slope: Estimate,
-    /// Sensor over board, minus one, at the mean distance: scale and bias together.
-    pub(super) ratio: Estimate,
-    /// Sensor minus board at the mean distance, metres.
-    pub(super) offset_m: Estimate,
+    /// Sensor minus board at the nearest, the mean and the farthest distance, metres.
+    pub(super) errors_m: [Estimate; 3],
+    /// These distances, metres.
+    pub(super) distances_m: [f64; 3],
 }
 
 impl Scaled {
     pub(super) fn new(line: &DepthLine, focal: &Measured) -> Self {
         let common = focal.relative_sigma();
-        let offset_sigma_m = line.offset_m.sigma.hypot(common * line.center_m);
+        let [near_m, far_m] = line.range_m;
+        let distances_m = [near_m, line.center_m, far_m];
         Self {
             slope: Estimate {
                 value: line.scale.value - 1.0,
                 sigma: line.scale.sigma.hypot(common),
             },
-            ratio: Estimate {
-                value: line.offset_m.value / line.center_m,
-                sigma: offset_sigma_m / line.center_m,
-            },
-            offset_m: Estimate { value: line.offset_m.value, sigma: offset_sigma_m },
+            errors_m: distances_m.map(|distance_m| {
+                let Estimate { value, sigma } = line.error_at_m(distance_m);
+                Estimate { value, sigma: sigma.hypot(common * distance_m) }
+            }),
+            distances_m,
         }
+    }
+
+    /// Sensor minus board at the mean distance, metres.
+    pub(super) fn offset_m(&self) -> Estimate {
+        self.errors_m[1]
+    }
+
+    /// Sensor over board minus one at the nearest, the mean and the farthest distance.
+    fn ratios(&self) -> [Estimate; 3] {
+        [0, 1, 2].map(|i| {
+            let Estimate { value, sigma } = self.errors_m[i];
+            Estimate { value: value / self.distances_m[i], sigma: sigma / self.distances_m[i] }
+        })
     }
 }
 
+/// The line and the focal length, where both are fit to judge the sensor by; otherwise why not.
+pub(super) fn basis<'a>(
+    case: &Case<'a>,
+    focal: Option<&'a Measured>,
+) -> Result<(&'a DepthLine, &'a Measured), String> {
+    let line = case.own_depth.and_then(|d| d.line.as_ref());
+    let (Some(line), Some(focal)) = (line, focal) else { return Err(why_unknown(case)) };
+    if focal.own_camera_ignores_distortion() {
+        return Err(format!(
+            "the stream is distorted (TD203) and the own camera's focal length of {:.2} px makes up for that, so that the \
+             board's depth is not to be relied on; a camera model with the distortion (method auto) can tell",
+            focal.own_px
+        ));
+    }
+    Ok((line, focal))
+}
+
 /// Why the sensor cannot be judged, with what was seen under the factory's focal length.
-pub(super) fn why_unknown(case: &Case<'_>) -> String {
+fn why_unknown(case: &Case<'_>) -> String {
     let mut why = if case.camera.is_none() {
         format!("the camera's own focal length is not known ({})", case.why_no_camera())
     } else if case.own_depth.is_none_or(|d| d.frames.iter().all(|f| f.samples.is_empty())) {
@@ -62,27 +93,35 @@ pub(super) fn why_unknown(case: &Case<'_>) -> String {
 pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
     let mut finding = Finding::new(Code::TD301, Unit::Percent);
     finding.tolerance = Some(100.0 * case.tolerances.depth_scale);
-    let line = case.own_depth.and_then(|d| d.line.as_ref());
-    let (Some(line), Some(focal)) = (line, focal) else {
-        finding.summary =
-            format!("Cannot tell whether depth has the right scale: {}.", why_unknown(case));
-        RECORD.clone_into(&mut finding.what_to_do);
-        return finding;
+    let (line, focal) = match basis(case, focal) {
+        Ok(both) => both,
+        Err(why) => {
+            finding.summary = format!("Cannot tell whether depth has the right scale: {why}.");
+            RECORD.clone_into(&mut finding.what_to_do);
+            return finding;
+        }
     };
-    let Scaled { slope, ratio, .. } = Scaled::new(line, focal);
-    let by_slope = Verdict::of(slope, case.tolerances.depth_scale);
-    let by_ratio = Verdict::of(ratio, case.tolerances.depth_scale);
-    let [near_m, far_m] = line.range_m;
-    // The slope tells a scale from a bias. Where it is too uncertain, depth at the recorded distances still is true or
-    // not, and a scale error there could hide only behind a bias that makes up for it.
-    let (verdict, deviation, basis) = if by_slope == Verdict::Unknown {
-        (
-            by_ratio,
+    let scaled = Scaled::new(line, focal);
+    let slope = scaled.slope;
+    let [_, ratio, _] = scaled.ratios();
+    let judge = |deviation| Verdict::of(deviation, case.tolerances.depth_scale);
+    let somewhere = scaled.ratios().into_iter().any(|ratio| judge(ratio) == Verdict::Fault);
+    let [near_m, _, far_m] = scaled.distances_m;
+    let (verdict, deviation, how) = match judge(slope) {
+        // The slope tells a scale from a bias. Where it is too uncertain, depth at the recorded distances still is true
+        // or not, and a wrong scale could hide there only behind a bias that makes up for it.
+        Verdict::Unknown => (
+            judge(ratio),
             ratio,
             "mean ratio of sensor to board; the distances are too alike to tell a scale from a bias",
-        )
-    } else {
-        (by_slope, slope, "slope of a robust line of sensor over board")
+        ),
+        // A slope that a bias makes up for at every distance recorded has harmed nobody.
+        Verdict::Fault if !somewhere => (
+            judge(ratio),
+            ratio,
+            "mean ratio of sensor to board; the slope over distance is steeper, but a bias makes up for it",
+        ),
+        verdict => (verdict, slope, "slope of a robust line of sensor over board"),
     };
     finding.verdict = verdict;
     finding.value = Some(100.0 * deviation.value);
@@ -107,7 +146,7 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
         Verdict::Unknown | Verdict::Warning => "Cannot tell whether depth has the right scale",
     };
     finding.summary = format!(
-        "{words}: {:+.2} +- {:.2} % between {near_m:.2} m and {far_m:.2} m ({basis}; sigma includes {:.2} % of the focal \
+        "{words}: {:+.2} +- {:.2} % between {near_m:.2} m and {far_m:.2} m ({how}; sigma includes {:.2} % of the focal \
          length; {} samples in {} frames; tolerance {:.1} %).",
         100.0 * deviation.value,
         100.0 * deviation.sigma,
@@ -118,7 +157,9 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
     );
     match verdict {
         Verdict::Fault => {
-            let scale = 1.0 + deviation.value;
+            // Without a bias worth the name the mean ratio knows the scale best.
+            let with_bias = line.bias_m.value.abs() > 3.0 * line.bias_m.sigma;
+            let scale = 1.0 + if with_bias { deviation.value } else { ratio.value };
             finding.what_to_do = format!(
                 "Divide depth by {scale:.4}. Make sure first that the board's squares really measure {:.3} mm: a board \
                  printed at another scale looks just so.",

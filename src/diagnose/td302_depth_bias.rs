@@ -3,34 +3,42 @@
 use super::{
     Case, Code, Correction, Evidence, Finding, Unit, Verdict,
     td201_focal_length::Measured,
-    td301_depth_scale::{RECORD, Scaled, why_unknown},
+    td301_depth_scale::{RECORD, Scaled, basis},
 };
 
 pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
     let mut finding = Finding::new(Code::TD302, Unit::Mm);
     let tolerance_m = case.tolerances.depth_bias_m;
     finding.tolerance = Some(1e3 * tolerance_m);
-    let line = case.own_depth.and_then(|d| d.line.as_ref());
-    let (Some(line), Some(focal)) = (line, focal) else {
-        finding.summary = format!("Cannot tell whether depth has a bias: {}.", why_unknown(case));
-        RECORD.clone_into(&mut finding.what_to_do);
-        return finding;
+    let (line, focal) = match basis(case, focal) {
+        Ok(both) => both,
+        Err(why) => {
+            finding.summary = format!("Cannot tell whether depth has a bias: {why}.");
+            RECORD.clone_into(&mut finding.what_to_do);
+            return finding;
+        }
     };
-    let Scaled { offset_m, .. } = Scaled::new(line, focal);
-    let by_bias = Verdict::of(line.bias_m, tolerance_m);
-    let by_offset = Verdict::of(offset_m, tolerance_m);
+    let scaled = Scaled::new(line, focal);
+    let offset_m = scaled.offset_m();
+    let judge = |deviation_m| Verdict::of(deviation_m, tolerance_m);
+    let somewhere = scaled.errors_m.into_iter().any(|error_m| judge(error_m) == Verdict::Fault);
+    let by_bias = judge(line.bias_m);
+    let doubtful = by_bias == Verdict::Unknown || (by_bias == Verdict::Fault && !somewhere);
     // An offset at the recorded distances that is surely small is good enough; one that is not may be a scale just as
     // well, and is TD301's to judge.
-    let offset_is_small = matches!(by_offset, Verdict::Ok | Verdict::Info);
-    let (verdict, deviation_m, basis) = if by_bias == Verdict::Unknown && offset_is_small {
-        (
-            by_offset,
-            offset_m,
-            "at the mean of the recorded distances; they are too alike to follow depth down to 0 m",
-        )
-    } else {
-        (by_bias, line.bias_m, "where a robust line of sensor over board meets 0 m")
-    };
+    let by_offset = judge(offset_m);
+    let (verdict, deviation_m, place) =
+        if doubtful && matches!(by_offset, Verdict::Ok | Verdict::Info) {
+            (
+                by_offset,
+                offset_m,
+                "at the mean of the recorded distances; followed down to 0 m it would be a guess",
+            )
+        } else if doubtful {
+            (Verdict::Unknown, line.bias_m, "where a robust line of sensor over board meets 0 m")
+        } else {
+            (by_bias, line.bias_m, "where a robust line of sensor over board meets 0 m")
+        };
     finding.verdict = verdict;
     finding.value = Some(1e3 * deviation_m.value);
     finding.sigma = Some(1e3 * deviation_m.sigma);
@@ -47,7 +55,7 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
         Verdict::Unknown | Verdict::Warning => "Cannot tell whether depth has a bias",
     };
     finding.summary = format!(
-        "{words}: {:+.2} +- {:.2} mm, sensor minus board ({basis}; tolerance {:.1} mm).",
+        "{words}: {:+.2} +- {:.2} mm, sensor minus board ({place}; tolerance {:.1} mm).",
         1e3 * deviation_m.value,
         1e3 * deviation_m.sigma,
         1e3 * tolerance_m,
