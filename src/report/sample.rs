@@ -5,7 +5,7 @@ use super::photo::Photo;
 use crate::{
     audit::{Audit, FrameAudit, Method},
     board::{CharucoBoard, Layout},
-    calibrate::{Calibration, Candidate, Estimate, Model, Outlier, Parameter},
+    calibrate::{self, Calibration, Candidate, Estimate, Model, Outlier, Parameter},
     camera::{Camera, Distortion, Intrinsics},
     depth::against_board,
     detect::{Corner, Identity, Observation, Reason, Reject},
@@ -147,9 +147,11 @@ fn calibration(frames: &[FrameAudit]) -> Calibration {
         model,
         rms_px,
         held_out_rms_px,
+        behind_best_sigmas: 0.0,
         focal_px,
     };
     Calibration {
+        method: calibrate::Method::Auto,
         model: Model::FocalCentre,
         camera: Camera { intrinsics: intrinsics(OWN_FOCAL_PX), distortion: Distortion::None },
         parameters: vec![
@@ -159,6 +161,7 @@ fn calibration(frames: &[FrameAudit]) -> Calibration {
         ],
         covariance: vec![0.124, 0.01, -0.02, 0.01, 0.0441, 0.0, -0.02, 0.0, 0.0676],
         views: frames.iter().filter_map(|f| f.own_view.clone()).collect(),
+        n_pictures: frames.len(),
         rms_px: 0.0964,
         candidates: vec![
             candidate(Model::Focal, 0.121, 0.128, estimate(530.9, 0.41)),
@@ -167,7 +170,9 @@ fn calibration(frames: &[FrameAudit]) -> Calibration {
             candidate(Model::Brown, 0.0951, 0.1049, estimate(529.7, 0.48)),
         ],
         split_half_focal_px: Some([estimate(529.6, 0.52), estimate(530.4, 0.49)]),
-        outliers: vec![Outlier { frame: 3, id: 61, residual_px: 2.31 }],
+        outliers: vec![Outlier { frame: 3, id: 61, residual_px: 2.31, residual_sigmas: 9.4 }],
+        distortion: None,
+        rejected: Vec::new(),
     }
 }
 
