@@ -31,6 +31,8 @@ const MIN_NODES: usize = 6;
 const MOST_LATTICES: usize = 4;
 /// Half of the image's diagonal in pixels of the coarsest level tried.
 const COARSEST: usize = 120;
+/// Rounds of looking for corners that the last round brought into reach.
+const MOST_PASSES: usize = 4;
 /// A corner whose σ exceeds this is of no use, pixels.
 const MAX_SIGMA_PX: f64 = 0.7;
 
@@ -146,14 +148,17 @@ impl Detector {
             }
         }
         let contrast = found.lattice.contrast;
-        // First with what the lattice knew, then with what that found: corners far from the lattice come into reach.
+        // First what the lattice foretells; what that finds brings corners into reach that were too far from it.
         let mut corners: Vec<Corner> = Vec::new();
-        for pass in 0..3 {
+        let mut failed: Vec<Reject> = Vec::new();
+        for _ in 0..MOST_PASSES {
             let Some(map) = SmoothMap::fit(&known) else { break };
             let n_before = corners.len();
-            corners.clear();
-            let mut failed = Vec::new();
+            failed.clear();
             for id in 0..board.n_corners() {
+                if corners[..n_before].binary_search_by_key(&id, |c| c.id).is_ok() {
+                    continue;
+                }
                 let (x, y) = board.corner_cell(id);
                 let (x, y) = (x as f64, y as f64);
                 let (Some(predicted), Some(axes)) = (map.at(x, y), map.axes(x, y)) else {
@@ -167,18 +172,14 @@ impl Detector {
                     Err(reason) => failed.push(Reject { pixel: predicted, reason }),
                 }
             }
-            known = corners
-                .iter()
-                .map(|c| {
-                    let (x, y) = board.corner_cell(c.id);
-                    ([x as f64, y as f64], c.pixel)
-                })
-                .collect();
-            if pass > 0 && corners.len() <= n_before || pass == 2 {
-                rejects.extend(failed);
+            let n_found = corners.len() - n_before;
+            corners.sort_unstable_by_key(|c| c.id);
+            if n_found == 0 || failed.is_empty() {
                 break;
             }
+            known = self.pairs(&corners);
         }
+        rejects.append(&mut failed);
         self.drop_strays(&mut corners, &mut rejects);
         let identity = Identity {
             layout: placement.layout,
@@ -215,16 +216,21 @@ impl Detector {
         Ok((refined.pixel, refined.sigma_px))
     }
 
+    /// Place on the board, in squares from its first corner, and in the image.
+    fn pairs(&self, corners: &[Corner]) -> Vec<([f64; 2], Pixel)> {
+        corners
+            .iter()
+            .map(|c| {
+                let (x, y) = self.board.corner_cell(c.id);
+                ([x as f64, y as f64], c.pixel)
+            })
+            .collect()
+    }
+
     /// Drops corners that the map through all others does not expect there.
     fn drop_strays(&self, corners: &mut Vec<Corner>, rejects: &mut Vec<Reject>) {
         loop {
-            let known: Vec<([f64; 2], Pixel)> = corners
-                .iter()
-                .map(|c| {
-                    let (x, y) = self.board.corner_cell(c.id);
-                    ([x as f64, y as f64], c.pixel)
-                })
-                .collect();
+            let known = self.pairs(corners);
             let Some(map) = SmoothMap::fit(&known) else { return };
             let distances: Vec<f64> = known
                 .iter()

@@ -38,11 +38,18 @@ pub(super) struct Scales<'a> {
     /// Standard deviation of the image's noise, grey levels.
     noise: f64,
     coarse: [Option<Gray>; MAX_FACTOR - 1],
+    /// Memory of the last window, for the next.
+    window: Window,
 }
 
 impl<'a> Scales<'a> {
     pub(super) fn new(image: &'a Gray) -> Self {
-        Self { image, noise: noise_sigma(image), coarse: [const { None }; MAX_FACTOR - 1] }
+        Self {
+            image,
+            noise: noise_sigma(image),
+            coarse: [const { None }; MAX_FACTOR - 1],
+            window: Window::default(),
+        }
     }
 
     /// The image itself.
@@ -50,10 +57,10 @@ impl<'a> Scales<'a> {
         self.image
     }
 
-    /// The image in blocks of `factor` × `factor` pixels, smoothed, and its noise.
-    fn at(&mut self, factor: usize) -> Option<(&Gray, f64)> {
+    /// The image in blocks of `factor` × `factor` pixels, smoothed, its noise, and memory for a window of it.
+    fn at(&mut self, factor: usize) -> Option<(&Gray, f64, &mut Window)> {
         if factor == 1 {
-            return Some((self.image, self.noise));
+            return Some((self.image, self.noise, &mut self.window));
         }
         let slot = &mut self.coarse[factor - 2];
         if slot.is_none() {
@@ -62,7 +69,7 @@ impl<'a> Scales<'a> {
             *slot = Some(Gray::new(level.width, level.height, pixels));
         }
         // Averaging divides white noise; what smoothing leaves of it is 0.27 of a pixel's (Σw² = 70/256 per axis).
-        Some((slot.as_ref()?, (0.27 * self.noise / factor as f64).max(ROUNDING)))
+        Some((slot.as_ref()?, (0.27 * self.noise / factor as f64).max(ROUNDING), &mut self.window))
     }
 }
 
@@ -85,8 +92,8 @@ const REACH: f64 = 0.42;
 const MARKER_BLUR: f64 = 1.2;
 /// The cross is never narrower than this, pixels: blurred edges are wider.
 const MIN_WIDTH: f64 = 2.0;
-/// Converged when a step is shorter than this, pixels.
-const CONVERGED: f64 = 2e-3;
+/// Converged when a step is shorter than this, pixels: steps shrink about fivefold, so what is left is a fifth of it.
+const CONVERGED: f64 = 1e-2;
 /// Steps at most. Good corners take two or three.
 const MOST_STEPS: usize = 8;
 /// What calibration targets, lenses and demosaicing leave even in a noiseless picture, pixels.
@@ -117,25 +124,26 @@ pub(super) fn refine(scales: &mut Scales<'_>, guess: &Guess, reach_px: f64) -> O
     let widest = blur[0].max(blur[1]);
     let factor = ((widest / KEPT_BLUR) as usize).clamp(1, MAX_FACTOR);
     let f = factor as f64;
-    let (image, noise) = scales.at(factor)?;
+    let (image, noise, window) = scales.at(factor)?;
     let offset = (f - 1.0) / 2.0;
     let scaled = Guess {
         pixel: Pixel::new((guess.pixel.x - offset) / f, (guess.pixel.y - offset) / f),
         axes: guess.axes.map(|a| a.map(|c| c / f)),
         ..*guess
     };
-    let found = refine_at(image, noise, &scaled, blur.map(|b| b / f), reach_px / f)?;
+    let found = refine_at(image, window, &scaled, blur.map(|b| b / f), reach_px / f)?;
     let blur_sigma = BLUR_SIGMA * (widest - SHARP).max(0.0);
     Some(Refined {
         pixel: Pixel::new(found.pixel.x * f + offset, found.pixel.y * f + offset),
-        sigma_px: (found.sigma_px * f).hypot(FLOOR_PX).hypot(blur_sigma),
+        sigma_px: (found.sigma_px * noise * f).hypot(FLOOR_PX).hypot(blur_sigma),
     })
 }
 
-/// [`refine`] on one scale; `blur` is the width of the blur across the edges along both axes, pixels.
+/// [`refine`] on one scale; `blur` is the width of the blur across the edges along both axes, pixels. σ is for noise of
+/// one grey level.
 fn refine_at(
     image: &Gray,
-    noise: f64,
+    window: &mut Window,
     guess: &Guess,
     blur: [f64; 2],
     reach_px: f64,
@@ -170,13 +178,13 @@ fn refine_at(
     let half =
         (along_u.max(width_v) * lu).max(along_v.max(width_u) * lv).min(MAX_REACH).ceil() as i64 + 1;
     let mut q = [guess.pixel.x, guess.pixel.y];
-    let mut window: Option<Window> = None;
+    let mut center: Option<(i64, i64)> = None;
     for step in 0..MOST_STEPS {
         let (cx, cy) = (q[0].round() as i64, q[1].round() as i64);
-        if window.as_ref().is_none_or(|w| (w.cx - cx).abs() > 1 || (w.cy - cy).abs() > 1) {
-            window = Some(Window::new(image, cx, cy, half)?);
+        if center.is_none_or(|(x, y)| (x - cx).abs() > 1 || (y - cy).abs() > 1) {
+            window.fill(image, cx, cy, half)?;
+            center = Some((cx, cy));
         }
-        let window = window.as_ref()?;
         let next = window.solve(&cross, q)?;
         let moved = (next[0] - q[0]).hypot(next[1] - q[1]);
         q = next;
@@ -184,8 +192,10 @@ fn refine_at(
             return None;
         }
         if moved < CONVERGED || (step + 1 == MOST_STEPS && moved < 0.05) {
-            let sigma_px = window.sigma(&cross, q, noise)?;
-            return Some(Refined { pixel: Pixel::new(q[0], q[1]), sigma_px });
+            return Some(Refined {
+                pixel: Pixel::new(q[0], q[1]),
+                sigma_px: window.sigma(&cross, q)?,
+            });
         }
     }
     None
@@ -258,24 +268,25 @@ const LANES: usize = 8;
 /// Gradients of a square part of the image, each at the centre of four pixels, after smoothing by (1 2 1)/4 along both
 /// axes: without it, sharp edges are undersampled and their squared gradients pull the corner towards pixel centres
 /// (0.07 px at a blur of σ = 0.6 px).
+#[derive(Debug, Default)]
 struct Window {
-    cx: i64,
-    cy: i64,
     /// Position of the first gradient.
     x0: f64,
     y0: f64,
-    /// Gradients in a row, without the padding.
-    columns: usize,
     rows: usize,
     /// Gradients in a row, padded with zeros to a multiple of [`LANES`].
     stride: usize,
     gx: Vec<f32>,
     gy: Vec<f32>,
+    /// Smoothed pixels, then the influences of gradients: memory only.
+    work: Vec<f32>,
+    column: Vec<u16>,
+    lines: [Vec<f32>; 2],
 }
 
 impl Window {
-    /// The window of ± `half` pixels about a pixel, clipped to the image; `None` where less than 4 × 4 remain.
-    fn new(image: &Gray, cx: i64, cy: i64, half: i64) -> Option<Self> {
+    /// Fills the window with ± `half` pixels about a pixel, clipped to the image; `None` where less than 4 × 4 remain.
+    fn fill(&mut self, image: &Gray, cx: i64, cy: i64, half: i64) -> Option<()> {
         let clip = |c: i64, size: usize| ((c - half).max(0), (c + half).min(size as i64 - 1));
         let (x0, x1) = clip(cx, image.width());
         let (y0, y1) = clip(cy, image.height());
@@ -286,44 +297,46 @@ impl Window {
         let (columns, rows) = (x1 as usize - x0, y1 as usize - y0);
         // Smoothed pixels: one more than gradients along both axes. Beyond the image its border repeats.
         let n = columns + 1;
-        let mut smooth = vec![0.0_f32; n * (rows + 1)];
-        let mut column = vec![0_u16; n + 2];
-        for (y, out) in smooth.chunks_exact_mut(n).enumerate() {
+        self.work.resize(n * (rows + 1), 0.0);
+        self.column.resize(n + 2, 0);
+        for (y, out) in self.work.chunks_exact_mut(n).enumerate() {
             let y = y0 + y;
-            let [a, b, c] =
-                [y.saturating_sub(1), y, (y + 1).min(image.height() - 1)].map(|y| image.row(y));
-            let vertical = |x: usize| u16::from(a[x]) + 2 * u16::from(b[x]) + u16::from(c[x]);
-            column[0] = vertical(x0.saturating_sub(1));
-            column[n + 1] = vertical((x0 + n).min(image.width() - 1));
-            for (out, x) in column[1..=n].iter_mut().zip(x0..) {
-                *out = vertical(x);
+            let [a, b, c] = [y.saturating_sub(1), y, (y + 1).min(image.height() - 1)]
+                .map(|y| &image.row(y)[x0..x0 + n]);
+            for (((out, a), b), c) in self.column[1..=n].iter_mut().zip(a).zip(b).zip(c) {
+                *out = u16::from(*a) + 2 * u16::from(*b) + u16::from(*c);
             }
-            for (out, w) in out.iter_mut().zip(column.windows(3)) {
-                *out = f32::from(w[0] + 2 * w[1] + w[2]) * (1.0 / 16.0);
+            let beyond = |x: usize| {
+                let [a, b, c] = [y.saturating_sub(1), y, (y + 1).min(image.height() - 1)]
+                    .map(|y| u16::from(image.row(y)[x]));
+                a + 2 * b + c
+            };
+            self.column[0] = beyond(x0.saturating_sub(1));
+            self.column[n + 1] = beyond((x0 + n).min(image.width() - 1));
+            let (l, m, r) = (&self.column[..n], &self.column[1..][..n], &self.column[2..][..n]);
+            for (((out, l), m), r) in out.iter_mut().zip(l).zip(m).zip(r) {
+                *out = f32::from(l + 2 * m + r) * (1.0 / 16.0);
             }
         }
         let stride = columns.next_multiple_of(LANES);
-        let (mut gx, mut gy) = (vec![0.0; stride * rows], vec![0.0; stride * rows]);
+        for g in [&mut self.gx, &mut self.gy] {
+            g.clear();
+            g.resize(stride * rows, 0.0);
+        }
         for y in 0..rows {
-            let (top, bottom) = (&smooth[y * n..][..n], &smooth[(y + 1) * n..][..n]);
-            let (gx, gy) = (&mut gx[y * stride..][..columns], &mut gy[y * stride..][..columns]);
+            let (top, bottom) = (&self.work[y * n..][..n], &self.work[(y + 1) * n..][..n]);
+            let gx = &mut self.gx[y * stride..][..columns];
+            let gy = &mut self.gy[y * stride..][..columns];
+            let (t1, b1) = (&top[1..][..columns], &bottom[1..][..columns]);
+            let (t0, b0) = (&top[..columns], &bottom[..columns]);
             for x in 0..columns {
-                let (t0, t1, b0, b1) = (top[x], top[x + 1], bottom[x], bottom[x + 1]);
-                gx[x] = 0.5 * ((t1 - t0) + (b1 - b0));
-                gy[x] = 0.5 * ((b0 - t0) + (b1 - t1));
+                gx[x] = 0.5 * ((t1[x] - t0[x]) + (b1[x] - b0[x]));
+                gy[x] = 0.5 * ((b0[x] - t0[x]) + (b1[x] - t1[x]));
             }
         }
-        Some(Self {
-            cx,
-            cy,
-            x0: x0 as f64 + 0.5,
-            y0: y0 as f64 + 0.5,
-            columns,
-            rows,
-            stride,
-            gx,
-            gy,
-        })
+        (self.x0, self.y0) = (x0 as f64 + 0.5, y0 as f64 + 0.5);
+        (self.rows, self.stride) = (rows, stride);
+        Some(())
     }
 
     /// One step: the corner that the weighted gradients about `q` point at.
@@ -359,68 +372,89 @@ impl Window {
         Some([q[0] + (c * rx - b * ry) / det, q[1] + (a * ry - b * rx) / det])
     }
 
-    /// Standard deviation per coordinate, from the noise of the pixels.
-    fn sigma(&self, cross: &Cross, q: [f64; 2], noise: f64) -> Option<f64> {
-        let (mut a, mut b, mut c) = (0.0, 0.0, 0.0);
-        // Influence of every smoothed pixel on Σ w g (gᵀ(p − q)): a gradient takes ±½ of its four pixels. A rim of
-        // zeros takes what smoothing spreads.
-        let n = self.columns + 3;
-        let mut influence = vec![[0.0_f32; 2]; n * (self.rows + 3)];
+    /// Standard deviation per coordinate, pixels per grey level of noise.
+    ///
+    /// The derivative of Σ w g (gᵀr) by one gradient is w·((gᵀr)·1 + g·rᵀ). A gradient is a difference of smoothed
+    /// pixels, so its influence spreads over 4 × 4 raw pixels by (−1 −1 1 1)/4 along and (1 3 3 1)/8 across it.
+    fn sigma(&mut self, cross: &Cross, q: [f64; 2]) -> Option<f64> {
+        let (mut a, mut b, mut c) = (0.0_f32, 0.0_f32, 0.0_f32);
+        // Rows and columns of zeros round the influences take what spreads.
+        let n = self.stride + LANES + 3;
+        let size = n * (self.rows + 6);
+        self.work.clear();
+        self.work.resize(4 * size, 0.0);
+        let (xx, rest) = self.work.split_at_mut(size);
+        let (yx, rest) = rest.split_at_mut(size);
+        let (xy, yy) = rest.split_at_mut(size);
         for y in 0..self.rows {
             let dy = (self.y0 + y as f64 - q[1]) as f32;
-            for x in 0..self.columns {
-                let dx = (self.x0 + x as f64 - q[0]) as f32;
+            let gx = &self.gx[y * self.stride..][..self.stride];
+            let gy = &self.gy[y * self.stride..][..self.stride];
+            let row = (y + 3) * n + 3..(y + 3) * n + 3 + self.stride;
+            let (xx, yx, xy, yy) =
+                (&mut xx[row.clone()], &mut yx[row.clone()], &mut xy[row.clone()], &mut yy[row]);
+            for x in 0..self.stride {
+                let dx = (self.x0 - q[0]) as f32 + x as f32;
                 let w = cross.weight(dx, dy);
-                if w == 0.0 {
-                    continue;
-                }
-                let (gx, gy) = (self.gx[y * self.stride + x], self.gy[y * self.stride + x]);
+                let (gx, gy) = (gx[x], gy[x]);
                 a += w * gx * gx;
                 b += w * gx * gy;
                 c += w * gy * gy;
-                // d/dg of g·(gᵀr) = (gᵀr)·1 + g·rᵀ.
                 let along = gx * dx + gy * dy;
-                let by_gx = [w * (along + gx * dx), w * (gy * dx)];
-                let by_gy = [w * (gx * dy), w * (along + gy * dy)];
-                let at = (y + 1) * n + x + 1;
-                for (at, sx, sy) in [
-                    (at, -0.5, -0.5),
-                    (at + 1, 0.5, -0.5),
-                    (at + n, -0.5, 0.5),
-                    (at + n + 1, 0.5, 0.5),
-                ] {
-                    influence[at][0] += sx * by_gx[0] + sy * by_gy[0];
-                    influence[at][1] += sx * by_gx[1] + sy * by_gy[1];
-                }
+                xx[x] = w * (along + gx * dx); // Of gx on the first sum,
+                yx[x] = w * (gy * dx); //          on the second;
+                xy[x] = w * (gx * dy); //          of gy on the first,
+                yy[x] = w * (along + gy * dy); //  on the second.
             }
         }
         let det = a * c - b * b;
         if !(det > 0.0) {
             return None;
         }
-        // From smoothed to raw pixels: the same kernel, being symmetric.
-        let across: Vec<[f32; 2]> = (0..influence.len())
-            .map(|i| {
-                let (l, m, r) = (
-                    influence[i.saturating_sub(1)],
-                    influence[i],
-                    influence[(i + 1).min(influence.len() - 1)],
-                );
-                [0, 1].map(|k| 0.25 * (l[k] + 2.0 * m[k] + r[k]))
-            })
-            .collect();
-        let (mut vxx, mut vyy) = (0.0_f32, 0.0_f32);
-        for i in 0..across.len() {
-            let zero = [0.0; 2];
-            let (t, m) = (if i >= n { across[i - n] } else { zero }, across[i]);
-            let l = across.get(i + n).copied().unwrap_or(zero);
-            let [ix, iy] = [0, 1].map(|k| 0.25 * (t[k] + 2.0 * m[k] + l[k]));
-            let (dx, dy) = ((c * ix - b * iy) / det, (a * iy - b * ix) / det);
-            vxx += dx * dx;
-            vyy += dy * dy;
+        // δq = M⁻¹ · (influences): the planes for x, then those for y.
+        let (ia, ib, ic) = (a / det, b / det, c / det);
+        let mut variance = 0.0;
+        for [p, r] in [[ic, -ib], [-ib, ia]] {
+            variance += spread(n, self.rows + 3, &[xx, yx, xy, yy], [p, r], &mut self.lines);
         }
-        Some(noise * f64::from(0.5 * (vxx + vyy)).sqrt())
+        Some((0.5 * variance).sqrt())
     }
+}
+
+/// Σ of the squared influences of all raw pixels, for the combination p·first + r·second of the influences of the
+/// gradients on the first and second sum.
+fn spread(
+    n: usize,
+    rows: usize,
+    planes: &[&mut [f32]; 4],
+    [p, r]: [f32; 2],
+    lines: &mut [Vec<f32>; 2],
+) -> f64 {
+    let [of_gx, of_gy] = lines;
+    of_gx.resize(n, 0.0);
+    of_gy.resize(n, 0.0);
+    let mut sum = 0.0;
+    for y in 0..rows {
+        let row = |plane: usize, k: usize| &planes[plane][(y + k) * n..][..n];
+        let gx = [0, 1, 2, 3].map(|k| (row(0, k), row(1, k)));
+        let gy = [0, 1, 2, 3].map(|k| (row(2, k), row(3, k)));
+        for x in 0..n {
+            let v = |(first, second): (&[f32], &[f32])| p * first[x] + r * second[x];
+            of_gx[x] = (v(gx[0]) + v(gx[3]) + 3.0 * (v(gx[1]) + v(gx[2]))) / 8.0;
+            of_gy[x] = (v(gy[2]) + v(gy[3]) - v(gy[0]) - v(gy[1])) / 4.0;
+        }
+        let mut lanes = [0.0_f32; LANES];
+        for (gx, gy) in of_gx.windows(LANES + 3).zip(of_gy.windows(LANES + 3)).step_by(LANES) {
+            for k in 0..LANES {
+                let from_gx = (gx[k + 2] + gx[k + 3] - gx[k] - gx[k + 1]) / 4.0;
+                let from_gy = (gy[k] + gy[k + 3] + 3.0 * (gy[k + 1] + gy[k + 2])) / 8.0;
+                let influence = from_gx + from_gy;
+                lanes[k] += influence * influence;
+            }
+        }
+        sum += lanes.iter().map(|&v| f64::from(v)).sum::<f64>();
+    }
+    sum
 }
 
 /// What rounding to 8 bits adds, grey levels: √(1/12).
