@@ -203,7 +203,7 @@ mod tests {
     #[test]
     fn large_images() {
         for (width, height) in [(640, 480), (300_000, 3), (3, 100_000)] {
-            let samples = (0..width * height).map(|i: usize| (i * i >> 7) as u8);
+            let samples = (0..width * height).map(|i: usize| ((i * i) >> 7) as u8);
             let gray = Gray::new(width, height, samples.collect());
             let rows = gray.pixels().chunks(width);
             let bytes: Vec<u8> =
