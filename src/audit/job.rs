@@ -435,13 +435,13 @@ fn own_camera(
 fn why_not_calibrated(error: &calibrate::Error) -> String {
     match error {
         calibrate::Error::TooFewViews { n_frames, n_views, needed, min_corners } => format!(
-            "{n_views} of {n_frames} frames with the board are of use for a calibration (at least {min_corners} corners, \
-             spread in both directions, from a place of their own), and it takes {needed}"
+            "{n_views} of {n_frames} frames with the board are of use for a calibration (at least {min_corners} \
+             corners, spread in both directions, from a place of their own), and it takes {needed}"
         ),
         calibrate::Error::Underdetermined { n_views, n_pictures, max_tilt_deg, focal_px } => {
             format!(
-                "the {n_views} views of the board ({n_pictures} different, tilted by at most {max_tilt_deg:.0} degrees) do not \
-             determine a focal length{}",
+                "the {n_views} views of the board ({n_pictures} different, tilted by at most {max_tilt_deg:.0} \
+                 degrees) do not determine a focal length{}",
                 focal_px.map_or(String::new(), |f| format!(
                     ", which comes out as {:.0} +- {:.0} px",
                     f.value, f.sigma

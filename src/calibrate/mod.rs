@@ -304,7 +304,8 @@ pub enum Error {
     /// Too few usable views.
     #[error(
         "{n_views} of {n_frames} frames show the board well enough (at least {min_corners} corners, spread in both \
-         directions); a calibration needs {needed} different views. Record 15 or more, tilted by 20° to 45° to all sides"
+         directions); a calibration needs {needed} different views. Record 15 or more, tilted by 20° to 45° to all \
+         sides"
     )]
     TooFewViews {
         /// Frames given.
@@ -340,7 +341,8 @@ pub enum Error {
     },
     /// Factory intrinsics that make no camera.
     #[error(
-        "factory intrinsics with focal lengths {fx_px}, {fy_px} px and principal point ({cx_px}, {cy_px}) px: no camera has these"
+        "factory intrinsics with focal lengths {fx_px}, {fy_px} px and principal point ({cx_px}, {cy_px}) px: no \
+         camera has these"
     )]
     Factory {
         /// Focal length.

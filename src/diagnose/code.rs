@@ -56,8 +56,13 @@ impl fmt::Display for Code {
 
 /// A name that is no code.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{0}` is not the code of a finding; known are {known}", known = Code::ALL.iter().map(|c| c.name()).collect::<Vec<_>>().join(", "))]
+#[error("`{0}` is not the code of a finding; known are {known}", known = known())]
 pub struct UnknownCode(pub String);
+
+/// All names, for the message.
+fn known() -> String {
+    Code::ALL.iter().map(|code| code.name()).collect::<Vec<_>>().join(", ")
+}
 
 impl FromStr for Code {
     type Err = UnknownCode;

@@ -166,8 +166,8 @@ pub(super) fn check(case: &Case<'_>, measured: Option<&Measured>) -> Finding {
     match finding.verdict {
         Verdict::Fault => {
             finding.what_to_do = format!(
-                "Use {focal_px:.2} px. With the factory's value every point cloud is {} sideways by {:.1} %, and a pose \
-                 found from the image lies {} by as much.",
+                "Use {focal_px:.2} px. With the factory's value every point cloud is {} sideways by {:.1} %, and a \
+                 pose found from the image lies {} by as much.",
                 if difference.value < 0.0 { "too small" } else { "too large" },
                 percent.abs(),
                 if difference.value < 0.0 { "too far" } else { "too near" },

@@ -168,8 +168,8 @@ pub(super) fn check(
             finding.evidence.push(Evidence::estimate("table_amount", amount));
             finding.evidence.push(Evidence::number("table_at_corner_px", measured.reference_px));
             format!(
-                "{:.0} % +- {:.0} % of the distortion in Apple's table is in the images, {value:+.2} +- {sigma:.2} px at \
-                 the image's corner; residuals are {:.2} px taken as rectified and {:.2} px with the table applied",
+                "{:.0} % +- {:.0} % of the distortion in Apple's table is in the images, {value:+.2} +- {sigma:.2} px \
+                 at the image's corner; residuals are {:.2} px taken as rectified and {:.2} px with the table applied",
                 100.0 * amount.value,
                 100.0 * amount.sigma,
                 rms_rectified_px,
@@ -177,15 +177,17 @@ pub(super) fn check(
             )
         }
         Shape::Own(_) => format!(
-            "the corners ask for a lens distortion of {value:.2} +- {sigma:.2} px at {radius_px:.0} px from the centre, within \
-             which nine of ten corners lie; residuals are {:.2} px without and {:.2} px with it. The recording has no table to \
-             compare with",
+            "the corners ask for a lens distortion of {value:.2} +- {sigma:.2} px at {radius_px:.0} px from the \
+             centre, within \
+             which nine of ten corners lie; residuals are {:.2} px without and {:.2} px with it. The recording has no \
+             table to compare with",
             joint.rms_without_px, joint.rms_with_px,
         ),
         Shape::Cubic { .. } => format!(
-            "a cubic lens distortion comes out as {value:+.2} +- {sigma:.2} px at {radius_px:.0} px from the centre, within \
-             which nine of ten corners lie; residuals are {:.2} px without and {:.2} px with it. The recording has no table to \
-             compare with",
+            "a cubic lens distortion comes out as {value:+.2} +- {sigma:.2} px at {radius_px:.0} px from the centre, \
+             within \
+             which nine of ten corners lie; residuals are {:.2} px without and {:.2} px with it. The recording has no \
+             table to compare with",
             joint.rms_without_px, joint.rms_px,
         ),
     };

@@ -62,8 +62,8 @@ pub(super) fn basis<'a>(
     let (Some(line), Some(focal)) = (line, focal) else { return Err(why_unknown(case)) };
     if focal.own_camera_ignores_distortion() {
         return Err(format!(
-            "the stream is distorted (TD203) and the own camera's focal length of {:.2} px makes up for that, so that the \
-             board's depth is not to be relied on; a camera model with the distortion (method auto) can tell",
+            "the stream is distorted (TD203) and the own camera's focal length of {:.2} px makes up for that, so that \
+             the board's depth is not to be relied on; a camera model with the distortion (method auto) can tell",
             focal.own_px
         ));
     }

@@ -28,8 +28,8 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
     } else {
         finding.verdict = Verdict::Info;
         finding.summary = format!(
-            "Principal point and lens distortion centre lie {distance_px:.2} px apart ({dx:+.2}, {dy:+.2}), as on iPads \
-             with the ultra-wide front camera."
+            "Principal point and lens distortion centre lie {distance_px:.2} px apart ({dx:+.2}, {dy:+.2}), as on \
+             iPads with the ultra-wide front camera."
         );
         finding.what_to_do =
             "Use the distortion centre with the lookup tables, and the principal point with the \

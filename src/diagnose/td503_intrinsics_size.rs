@@ -45,8 +45,8 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
     let scaled = factory.reference_dimensions.map(|[w, h]| [width / w, height / h]);
     let fits = scaled.filter(|[x, y]| off_center(k.cx * x, k.cy * y).abs() <= FARTHEST);
     finding.summary = format!(
-        "The intrinsics are not those of the {width}x{height} image: the principal point ({:.1}, {:.1}) lies {:+.0} % off \
-         its centre.",
+        "The intrinsics are not those of the {width}x{height} image: the principal point ({:.1}, {:.1}) lies {:+.0} % \
+         off its centre.",
         k.cx,
         k.cy,
         100.0 * off

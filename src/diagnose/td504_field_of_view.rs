@@ -23,8 +23,8 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
     if !(least..=most).contains(&angle_deg) {
         finding.verdict = Verdict::Fault;
         finding.summary = format!(
-            "The factory's focal length of {:.1} px makes a field of view of {angle_deg:.1} degrees, which no such camera \
-             has ({least:.0} to {most:.0}).",
+            "The factory's focal length of {:.1} px makes a field of view of {angle_deg:.1} degrees, which no such \
+             camera has ({least:.0} to {most:.0}).",
             k.focal_px()
         );
         finding.what_to_do =
@@ -40,8 +40,8 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
         if (stated_deg - angle_deg).abs() > SAME_DEG {
             finding.verdict = Verdict::Info;
             finding.summary = format!(
-                "The factory's focal length makes a field of view of {angle_deg:.1} degrees, the device's format states \
-                 {stated_deg:.1}."
+                "The factory's focal length makes a field of view of {angle_deg:.1} degrees, the device's format \
+                 states {stated_deg:.1}."
             );
             finding.what_to_do = "Do not compute a focal length from the stated field of view: it is that of another \
                                   crop of the sensor."

@@ -15,7 +15,8 @@ use crate::{
 /// How a recording goes about it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trajectory {
-    /// Hand-held round the board, one frame each half second, as one records for a calibration: 0.17 to 0.4 m away (nearer before a wider lens),
+    /// Hand-held round the board, one frame each half second, as one records for a calibration: 0.17 to 0.4 m away
+    /// (nearer before a wider lens),
     /// tilted by up to 50°, turned by up to 60°, the board partly outside the image, some frames blurred by motion.
     HandHeld,
     /// Straight before the board at 0.2 m and nearly still, as one records to check depth.
