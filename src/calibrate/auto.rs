@@ -5,12 +5,12 @@ use super::{
     fit::{Data, Fit, fit},
     model::{Center, Shape, Warp},
     problem::Measured,
+    surface::{Surface, lifted, prior_sigma_m},
     views::{self, MIN_CORNERS, all_usable},
     weigh::{drop_outliers, weigh},
 };
 use crate::{
-    camera::Camera,
-    geom::Point,
+    camera::{Camera, Distortion},
     pose::Weighting,
     solve::{Loss, mean, standard_error},
 };
@@ -24,12 +24,19 @@ pub(super) const MIN_PICTURES: usize = 3;
 /// Corners up to so many standard deviations count in full, beyond only linearly: 1 % of normal ones do.
 const LOSS: Loss = Loss::Huber { threshold: 3.0 };
 
+/// Parameters are good to 1e-4 of their σ then.
+const COST_TOLERANCE: f64 = 1e-12;
+
 /// Views, weighed, without outliers, ready for any model.
 pub(super) struct Prepared {
     pub(super) views: Vec<Measured>,
     pub(super) outliers: Vec<Outlier>,
     pub(super) rejected: Vec<RejectedFrame>,
     pub(super) pictures: Vec<usize>,
+    /// Is the board's shape estimated with the camera?
+    pub(super) surface: Surface,
+    /// Its numbers as far as known, metres.
+    pub(super) surface_start_m: Vec<f64>,
 }
 
 impl Prepared {
@@ -53,87 +60,104 @@ impl Prepared {
 }
 
 /// Gathers all usable views; weighs their corners and finds outliers under a model that no lens of ours is far from
-/// (focal length, centre, k1, k2), so that what is left out does not depend on the model judged later.
+/// (focal length, centre, k1, k2), so that what is left out does not depend on the model judged later; decides by
+/// held-out pictures (one-standard-error rule) whether the board is taken for flat.
 pub(super) fn prepare(input: &Input<'_>) -> Result<Prepared, Error> {
     let weighting = Weighting::Sigma { floor_px: 0.1 };
-    let mut gathered = all_usable(input, MIN_CORNERS, weighting);
+    let gathered = all_usable(input, MIN_CORNERS, weighting);
     views::require(input, &gathered, MIN_PICTURES, MIN_CORNERS)?;
-    let pinhole =
-        Camera { intrinsics: *input.factory, distortion: crate::camera::Distortion::None };
-    let first = residuals_px(&gathered.views, &pinhole);
-    weigh(&mut gathered.views, &first, 1.0);
-
-    let flexible = [
-        Shape { center: Center::Free, warp: Warp::FreeRadial2 },
-        Shape { center: Center::Free, warp: Warp::None },
-        Shape { center: Center::Fixed, warp: Warp::None },
-    ];
-    let mut outliers = Vec::new();
-    let mut rejected = gathered.rejected;
+    let mut prepared = Prepared {
+        views: gathered.views,
+        outliers: Vec::new(),
+        rejected: gathered.rejected,
+        pictures: Vec::new(),
+        surface: Surface::Flat,
+        surface_start_m: Vec::new(),
+    };
+    let pinhole = Camera { intrinsics: *input.factory, distortion: Distortion::None };
+    let first = residuals_px(&prepared.views, &pinhole, &[]);
+    weigh(&mut prepared.views, &first, 1.0);
     // Once with a loss that forgives gross errors, once with those gone.
     for loss in [Loss::Cauchy { scale: 3.0 }, LOSS] {
-        let references: Vec<&Measured> = gathered.views.iter().collect();
-        let pictures = views::pictures(&references, input.factory.width);
-        let data = Data { factory: input.factory, views: &references, pictures: &pictures, loss };
-        let poses: Vec<_> = gathered.views.iter().map(|v| v.pose).collect();
-        let undetermined = |focal_px| Error::Underdetermined {
-            n_views: references.len(),
-            n_pictures: data.n_pictures(),
-            max_tilt_deg: views::max_tilt_deg(poses.iter()),
-            focal_px,
-        };
-        if data.n_pictures() < MIN_PICTURES {
-            return Err(undetermined(None));
-        }
-        let mut closest: Option<Estimate> = None;
-        let found = flexible.iter().find_map(|shape| {
-            let fit = fit(*shape, &data, &shape.start(input.factory), &poses)?;
-            let focal = fit.focal_px();
-            if focal.sigma <= MAX_FOCAL_SIGMA * focal.value {
-                return Some((fit, *shape));
-            }
-            closest = focal.sigma.is_finite().then_some(focal).or(closest);
-            None
-        });
-        let (fit, shape) = found.ok_or_else(|| undetermined(closest))?;
+        let (shape, fit) = flexible(input, &mut prepared, loss)?;
         let camera = shape.camera(input.factory, input.tables, &fit.free);
-        for (view, pose) in gathered.views.iter_mut().zip(&fit.poses) {
+        for (view, pose) in prepared.views.iter_mut().zip(&fit.poses) {
             view.pose = *pose;
         }
-        let residuals = residuals_px(&gathered.views, &camera);
+        prepared.surface = shape.surface;
+        prepared.surface_start_m = shape.surface_numbers(&fit.free).to_vec();
+        let residuals = residuals_px(&prepared.views, &camera, &prepared.surface_start_m);
         let n_corners: usize = residuals.iter().map(Vec::len).sum();
         let taken = (fit.free.len() + 6 * residuals.len()) as f64;
-        weigh(&mut gathered.views, &residuals, 1.0 - taken / (2 * n_corners) as f64);
-        let (corners, frames) = drop_outliers(&mut gathered.views, &residuals, MIN_CORNERS);
-        outliers.extend(corners);
-        rejected.extend(frames);
-        if gathered.views.len() < MIN_PICTURES {
+        weigh(&mut prepared.views, &residuals, 1.0 - taken / (2 * n_corners) as f64);
+        let (corners, frames) = drop_outliers(&mut prepared.views, &residuals, MIN_CORNERS);
+        prepared.outliers.extend(corners);
+        prepared.rejected.extend(frames);
+        if prepared.views.len() < MIN_PICTURES {
             return Err(Error::TooFewViews {
                 n_frames: input.frames.len(),
-                n_views: gathered.views.len(),
+                n_views: prepared.views.len(),
                 needed: MIN_PICTURES,
                 min_corners: MIN_CORNERS,
             });
         }
     }
-    outliers.sort_by_key(|o| (o.frame, o.id));
-    rejected.sort_by_key(|r| r.frame);
-    let references: Vec<&Measured> = gathered.views.iter().collect();
-    let pictures = views::pictures(&references, input.factory.width);
-    drop(references);
-    Ok(Prepared { views: gathered.views, outliers, rejected, pictures })
+    prepared.outliers.sort_by_key(|o| (o.frame, o.id));
+    prepared.rejected.sort_by_key(|r| r.frame);
+    prepared.pictures = views::pictures(&prepared.references(), input.factory.width);
+    Ok(prepared)
 }
 
-/// Observed minus projected; a corner that does not project is infinitely far off.
-pub(super) fn residuals_px(views: &[Measured], camera: &Camera) -> Vec<Vec<[f64; 2]>> {
+/// The most flexible shape that the views determine, fitted.
+fn flexible<'a>(
+    input: &Input<'_>,
+    prepared: &mut Prepared,
+    loss: Loss,
+) -> Result<(Shape<'a>, Fit), Error> {
+    prepared.pictures = views::pictures(&prepared.references(), input.factory.width);
+    if prepared.n_pictures() < MIN_PICTURES {
+        return Err(underdetermined(prepared, None));
+    }
+    let mut closest: Option<Estimate> = None;
+    let mut attempt = |center, warp, surface| {
+        let shape = Shape { center, warp, surface };
+        let fit = fit_with(input, prepared, shape, loss)?;
+        let focal = fit.focal_px();
+        if focal.sigma <= MAX_FOCAL_SIGMA * focal.value {
+            return Some((shape, fit));
+        }
+        closest = focal.sigma.is_finite().then_some(focal).or(closest);
+        None
+    };
+    let flat = attempt(Center::Free, Warp::FreeRadial2, Surface::Flat)
+        .or_else(|| attempt(Center::Free, Warp::None, Surface::Flat))
+        .or_else(|| attempt(Center::Fixed, Warp::None, Surface::Flat));
+    let free =
+        flat.as_ref().and_then(|(shape, _)| attempt(shape.center, shape.warp, Surface::Free));
+    match (flat, free) {
+        (Some((_, flat)), Some((shape, free))) if behind_sigmas(&flat, &free) > 1.0 => {
+            Ok((shape, free))
+        }
+        (Some(flat), _) => Ok(flat),
+        (None, _) => Err(underdetermined(prepared, closest)),
+    }
+}
+
+/// Observed minus projected, on a board with these surface numbers (metres, none for flat); a corner that does not
+/// project is infinitely far off.
+pub(super) fn residuals_px(
+    views: &[Measured],
+    camera: &Camera,
+    surface_m: &[f64],
+) -> Vec<Vec<[f64; 2]>> {
     views
         .iter()
         .map(|view| {
             view.corners
                 .iter()
-                .zip(&view.points)
-                .map(|(corner, point)| {
-                    match camera.project(view.pose * Point::from_coords(*point)) {
+                .zip(view.points.iter().zip(&view.modes))
+                .map(|(corner, (point, modes))| {
+                    match camera.project(view.pose * lifted(point, modes, surface_m)) {
                         Some(pixel) => corner.pixel - pixel,
                         None => [f64::INFINITY; 2],
                     }
@@ -149,15 +173,35 @@ pub(super) fn fit_prepared(
     prepared: &Prepared,
     shape: Shape<'_>,
 ) -> Option<Fit> {
+    fit_with(input, prepared, shape, LOSS)
+}
+
+fn fit_with(input: &Input<'_>, prepared: &Prepared, shape: Shape<'_>, loss: Loss) -> Option<Fit> {
     let references = prepared.references();
-    let data = Data {
-        factory: input.factory,
-        views: &references,
-        pictures: &prepared.pictures,
-        loss: LOSS,
-    };
+    let data = data(input, &references, &prepared.pictures, loss);
     let poses: Vec<_> = prepared.views.iter().map(|v| v.pose).collect();
-    fit(shape, &data, &shape.start(input.factory), &poses)
+    let mut start = shape.start(input.factory);
+    let n_camera = start.len() - shape.surface.n_modes();
+    if shape.surface == prepared.surface {
+        start[n_camera..].copy_from_slice(&prepared.surface_start_m);
+    }
+    fit(shape, &data, &start, &poses)
+}
+
+fn data<'a>(
+    input: &'a Input<'_>,
+    views: &'a [&'a Measured],
+    pictures: &'a [usize],
+    loss: Loss,
+) -> Data<'a> {
+    Data {
+        factory: input.factory,
+        views,
+        pictures,
+        loss,
+        surface_sigma_m: prior_sigma_m(input.board),
+        cost_tolerance: COST_TOLERANCE,
+    }
 }
 
 /// A fit to every other view, beginning with `first`; `None` where these do not determine the focal length.
@@ -171,7 +215,7 @@ pub(super) fn half_focal_px(
     let half: Vec<&Measured> = prepared.views.iter().skip(first).step_by(2).collect();
     let poses: Vec<_> = whole.poses.iter().copied().skip(first).step_by(2).collect();
     let pictures = views::pictures(&half, input.factory.width);
-    let data = Data { factory: input.factory, views: &half, pictures: &pictures, loss: LOSS };
+    let data = data(input, &half, &pictures, LOSS);
     if data.n_pictures() < MIN_PICTURES {
         return None;
     }
@@ -196,7 +240,7 @@ pub(super) fn choose(
     let fits: Vec<(Model, Fit)> = Model::ALL
         .into_iter()
         .filter_map(|model| {
-            let fit = fit_prepared(input, prepared, model.shape(input.tables)?)?;
+            let fit = fit_prepared(input, prepared, model.shape(input.tables, prepared.surface)?)?;
             let focal = fit.focal_px();
             (focal.sigma <= MAX_FOCAL_SIGMA * focal.value).then_some((model, fit))
         })
@@ -246,7 +290,7 @@ pub(super) fn underdetermined(prepared: &Prepared, focal_px: Option<Estimate>) -
 }
 
 fn rms_px(input: &Input<'_>, prepared: &Prepared, model: Model, fit: &Fit) -> f64 {
-    match model.shape(input.tables) {
+    match model.shape(input.tables, prepared.surface) {
         Some(shape) => shape_rms_px(input, prepared, shape, fit),
         None => f64::NAN,
     }
@@ -260,10 +304,12 @@ pub(super) fn shape_rms_px(
     fit: &Fit,
 ) -> f64 {
     let camera = shape.camera(input.factory, input.tables, &fit.free);
+    let surface = shape.surface_numbers(&fit.free);
     let (mut squares, mut n) = (0.0, 0);
     for (view, pose) in prepared.views.iter().zip(&fit.poses) {
-        for (corner, point) in view.corners.iter().zip(&view.points) {
-            let pixel = camera.project(*pose * Point::from_coords(*point));
+        for (corner, (point, modes)) in view.corners.iter().zip(view.points.iter().zip(&view.modes))
+        {
+            let pixel = camera.project(*pose * lifted(point, modes, surface));
             squares += pixel.map_or(f64::INFINITY, |p| corner.pixel.distance(p).powi(2));
             n += 1;
         }

@@ -5,6 +5,7 @@ use super::{
     auto::{Prepared, behind_sigmas, fit_prepared, shape_rms_px},
     fit::Fit,
     model::{Center, Shape, Warp, brown},
+    surface::Surface,
 };
 use crate::camera::{Intrinsics, RadialTable, TablePair};
 
@@ -12,11 +13,17 @@ use crate::camera::{Intrinsics, RadialTable, TablePair};
 pub(super) fn test(input: &Input<'_>, prepared: &Prepared) -> Option<DistortionTest> {
     let mut hypotheses = Vec::new();
     let mut add = |lens: Lens, warp: Warp<'_>| -> Option<Fit> {
-        let shape = Shape { center: Center::Free, warp };
+        let shape = Shape { center: Center::Free, warp, surface: prepared.surface };
         let fit = fit_prepared(input, prepared, shape).filter(|fit| fit.covariance.is_some())?;
+        let flat = Shape { surface: Surface::Flat, ..shape };
+        let flat_fit = match prepared.surface {
+            Surface::Flat => fit.clone(),
+            Surface::Free => fit_prepared(input, prepared, flat)?,
+        };
         hypotheses.push(Hypothesis {
             lens,
             rms_px: shape_rms_px(input, prepared, shape, &fit),
+            flat_rms_px: shape_rms_px(input, prepared, flat, &flat_fit),
             held_out_rms_px: prepared.held_out_rms_px(&fit),
             focal_px: fit.focal_px(),
         });
@@ -29,8 +36,9 @@ pub(super) fn test(input: &Input<'_>, prepared: &Prepared) -> Option<DistortionT
         add(Lens::ForwardTable, Warp::Table(forward));
         by_table = add(Lens::FreeTable, Warp::FreeTable(inverse)).map(|fit| (fit, inverse));
     }
-    let one = Shape { center: Center::Free, warp: Warp::FreeRadial1 };
-    let two = Shape { center: Center::Free, warp: Warp::FreeRadial2 };
+    let surface = prepared.surface;
+    let one = Shape { center: Center::Free, warp: Warp::FreeRadial1, surface };
+    let two = Shape { center: Center::Free, warp: Warp::FreeRadial2, surface };
     let fit_one = fit_prepared(input, prepared, one).filter(|fit| fit.covariance.is_some())?;
     let fit_two = fit_prepared(input, prepared, two)
         .filter(|fit| fit.covariance.is_some() && behind_sigmas(&fit_one, fit) > 1.0);
@@ -39,7 +47,12 @@ pub(super) fn test(input: &Input<'_>, prepared: &Prepared) -> Option<DistortionT
 
     let corner_shift_px = match &by_table {
         Some((fit, table)) => propagate(fit, |free| Some(table_shift_px(table, free[3]))),
-        None => propagate(&by_radial, |free| radial_shift_px(input.factory, free)),
+        None => {
+            let n_radial = if fit_two.is_some() { 2 } else { 1 };
+            propagate(&by_radial, |free| {
+                radial_shift_px(input.factory, free, &free[3..3 + n_radial])
+            })
+        }
     };
     Some(DistortionTest {
         amplitude: by_table.as_ref().map(|(fit, _)| fit.estimate(3)),
@@ -57,9 +70,9 @@ fn table_shift_px(table: &RadialTable, amplitude: f64) -> f64 {
 }
 
 /// The same with Brown's polynomial; `None` where it folds before the corner.
-fn radial_shift_px(factory: &Intrinsics, free: &[f64]) -> Option<f64> {
-    let shape = Shape { center: Center::Free, warp: Warp::None };
-    let pinhole = shape.intrinsics(factory, free);
+fn radial_shift_px(factory: &Intrinsics, free: &[f64], radial: &[f64]) -> Option<f64> {
+    let fy = free[0] * (factory.fy / factory.fx);
+    let pinhole = Intrinsics { fx: free[0], fy, cx: free[1], cy: free[2], ..*factory };
     let edge = |c: f64, size: usize| {
         let last = size as f64 - 0.5;
         if c + 0.5 > last - c { -0.5 - c } else { last - c }
@@ -68,7 +81,7 @@ fn radial_shift_px(factory: &Intrinsics, free: &[f64]) -> Option<f64> {
         edge(pinhole.cx, pinhole.width) / pinhole.fx,
         edge(pinhole.cy, pinhole.height) / pinhole.fy,
     ];
-    let straight = brown(&free[3..]).undistort(corner)?;
+    let straight = brown(radial).undistort(corner)?;
     let length = |ray: [f64; 2]| (ray[0] * pinhole.fx).hypot(ray[1] * pinhole.fy);
     Some(length(corner) - length(straight))
 }

@@ -22,6 +22,10 @@ pub(super) struct Data<'a> {
     /// For each view the number of the picture it is one of; pictures count from 0 without gaps.
     pub(super) pictures: &'a [usize],
     pub(super) loss: Loss,
+    /// The σ of each mode of the board's surface beforehand, metres.
+    pub(super) surface_sigma_m: f64,
+    /// As [`Effort::cost_tolerance`].
+    pub(super) cost_tolerance: f64,
 }
 
 impl Data<'_> {
@@ -73,6 +77,11 @@ pub(super) fn fit(
         4 => fit_sized::<4>(shape, data, free, poses),
         5 => fit_sized::<5>(shape, data, free, poses),
         8 => fit_sized::<8>(shape, data, free, poses),
+        13 => fit_sized::<13>(shape, data, free, poses),
+        15 => fit_sized::<15>(shape, data, free, poses),
+        16 => fit_sized::<16>(shape, data, free, poses),
+        17 => fit_sized::<17>(shape, data, free, poses),
+        20 => fit_sized::<20>(shape, data, free, poses),
         n => unreachable!("no shape has {n} free numbers"),
     }
 }
@@ -85,11 +94,17 @@ fn fit_sized<const S: usize>(
 ) -> Option<Fit> {
     let degrees =
         (2 * data.n_corners()).checked_sub(S + 6 * data.views.len()).filter(|&d| d > 0)?;
-    let problem =
-        Reprojection::<S> { shape, factory: data.factory, views: data.views, loss: data.loss };
+    let problem = Reprojection::<S> {
+        shape,
+        factory: data.factory,
+        views: data.views,
+        loss: data.loss,
+        surface_sigma_m: data.surface_sigma_m,
+    };
     let shared: [f64; S] = free.try_into().expect("dispatched on the length");
     let start = Arrow { shared, blocks: poses.to_vec() };
-    let minimum = minimize(&BySchur(&problem), start, Effort::default())?;
+    let effort = Effort { cost_tolerance: data.cost_tolerance, ..Effort::default() };
+    let minimum = minimize(&BySchur(&problem), start, effort)?;
 
     // The robust sum of squares, but for the rare corner beyond the loss' threshold, is the weighted one.
     let variance = 2.0 * minimum.cost / degrees as f64;
@@ -97,7 +112,7 @@ fn fit_sized<const S: usize>(
     let mut held_out = vec![0.0; data.n_pictures()];
     let mut diagonal = [0.0; S];
     let mut reducible = true;
-    for (block, &picture) in minimum.normal.iter().zip(data.pictures) {
+    for (block, &picture) in minimum.normal.blocks.iter().zip(data.pictures) {
         match block.reduce() {
             Some(reduced) => pictures[picture].add(&reduced),
             None => reducible = false,
@@ -107,9 +122,11 @@ fn fit_sized<const S: usize>(
             *sum += d;
         }
     }
-    let determined = reducible && is_determined(&total(&pictures), &diagonal);
-    let covariance = determined.then(|| covariance(&pictures, variance)).flatten();
-    for (sum, rise) in held_out.iter_mut().zip(leave_one_out_rise(&pictures)) {
+    let mut all = total(&pictures);
+    all.add(&minimum.normal.prior);
+    let determined = reducible && is_determined(&all, &diagonal);
+    let covariance = determined.then(|| covariance(&all, &pictures, variance)).flatten();
+    for (sum, rise) in held_out.iter_mut().zip(leave_one_out_rise(&all, &pictures)) {
         *sum = match rise {
             Some(rise) if covariance.is_some() => *sum + rise,
             _ => f64::INFINITY,
@@ -136,11 +153,71 @@ fn is_determined<const S: usize>(all: &Reduced<S>, diagonal: &[f64; S]) -> bool 
 
 /// The larger of the classical covariance and that clustered by picture, row-major. With a single picture there is
 /// only the classical one.
-fn covariance<const S: usize>(pictures: &[Reduced<S>], variance: f64) -> Option<Vec<f64>> {
-    let classical = classical(pictures, variance)?;
-    let joined = match clustered(pictures) {
+fn covariance<const S: usize>(
+    all: &Reduced<S>,
+    pictures: &[Reduced<S>],
+    variance: f64,
+) -> Option<Vec<f64>> {
+    let classical = classical(all, variance)?;
+    let joined = match clustered(all, pictures) {
         Some(clustered) => larger(&classical, &clustered),
         None => classical,
     };
     Some(joined.into_iter().flatten().collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        calibrate::{
+            Input,
+            model::{Center, Warp},
+            surface::Surface,
+            synthetic::{FACTORY, Scene, board},
+            views::all_usable,
+        },
+        camera::Distortion,
+        pose::Weighting,
+    };
+
+    /// The held-out sums by one step of the normal equations, against refits without each view.
+    #[test]
+    fn held_out_sums_are_those_of_refits() {
+        let board = board();
+        let frames = Scene { noise_px: 0.3, ..Scene::new(Distortion::None) }.frames(2);
+        let input = Input { board: &board, factory: &FACTORY, tables: None, frames: &frames };
+        let gathered = all_usable(&input, 6, Weighting::Equal);
+        let views: Vec<&Measured> = gathered.views.iter().collect();
+        let poses: Vec<_> = gathered.views.iter().map(|v| v.pose).collect();
+        let (center, warp, surface) = (Center::Free, Warp::FreeRadial2, Surface::Flat);
+        let shape = Shape { center, warp, surface };
+        let fit_of = |views: &[&Measured], shape: Shape<'_>, free: &[f64], poses: &[_]| {
+            let pictures: Vec<usize> = (0..views.len()).collect();
+            let data = Data {
+                factory: &FACTORY,
+                views,
+                pictures: &pictures,
+                loss: Loss::Squared,
+                surface_sigma_m: 1e-3,
+                cost_tolerance: 1e-12,
+            };
+            fit(shape, &data, free, poses).unwrap()
+        };
+        let whole = fit_of(&views, shape, &shape.start(&FACTORY), &poses);
+        for left_out in 0..views.len() {
+            let others: Vec<usize> = (0..views.len()).filter(|i| *i != left_out).collect();
+            let their_views: Vec<&Measured> = others.iter().map(|i| views[*i]).collect();
+            let their_poses: Vec<_> = others.iter().map(|i| poses[*i]).collect();
+            let refit = fit_of(&their_views, shape, &whole.free, &their_poses);
+            let camera = shape.camera(&FACTORY, None, &refit.free);
+            let corners = &views[left_out].corners;
+            let view =
+                crate::pose::View::from_corners(0, &board, &camera, corners, Weighting::Equal)
+                    .unwrap();
+            let truth = view.rms_px.powi(2) * corners.len() as f64;
+            let predicted = whole.held_out[left_out];
+            assert!((predicted / truth - 1.0).abs() < 0.02, "{predicted} {truth}");
+        }
+    }
 }

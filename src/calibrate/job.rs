@@ -7,9 +7,14 @@ use super::{
     fit::{Data, Fit, fit},
     model::Shape,
     problem::Measured,
+    surface::{self, Surface},
     views,
 };
-use crate::{pose::View, solve::Loss};
+use crate::{
+    geom::{Board, Point},
+    pose::View,
+    solve::{Effort, Loss},
+};
 
 /// The intrinsics that explain these corners.
 ///
@@ -47,8 +52,10 @@ pub fn calibrate(input: &Input<'_>, method: Method) -> Result<Calibration, Error
             plain(input, method, model, gathered)
         }
         Method::Robust(model) => {
-            let shape = model.shape(input.tables).ok_or(Error::NoTables { model })?;
+            let shape =
+                model.shape(input.tables, Surface::Flat).ok_or(Error::NoTables { model })?;
             let prepared = auto::prepare(input)?;
+            let shape = Shape { surface: prepared.surface, ..shape };
             let fit = auto::fit_prepared(input, &prepared, shape)
                 .ok_or_else(|| auto::underdetermined(&prepared, None))?;
             robust(input, method, model, prepared, &fit, Vec::new())
@@ -71,7 +78,7 @@ fn plain(
     model: Model,
     views::Gathered { views, rejected }: views::Gathered,
 ) -> Result<Calibration, Error> {
-    let shape = model.shape(input.tables).ok_or(Error::NoTables { model })?;
+    let shape = model.shape(input.tables, Surface::Flat).ok_or(Error::NoTables { model })?;
     let references: Vec<&Measured> = views.iter().collect();
     let pictures = views::pictures(&references, input.factory.width);
     let data = Data {
@@ -79,10 +86,19 @@ fn plain(
         views: &references,
         pictures: &pictures,
         loss: Loss::Squared,
+        surface_sigma_m: surface::prior_sigma_m(input.board),
+        cost_tolerance: Effort::default().cost_tolerance,
     };
     let poses: Vec<_> = views.iter().map(|v| v.pose).collect();
     let fit = fit(shape, &data, &shape.start(input.factory), &poses);
-    let prepared = Prepared { views, outliers: Vec::new(), rejected, pictures };
+    let prepared = Prepared {
+        views,
+        outliers: Vec::new(),
+        rejected,
+        pictures,
+        surface: Surface::Flat,
+        surface_start_m: Vec::new(),
+    };
     let fit = fit.ok_or_else(|| auto::underdetermined(&prepared, None))?;
     let result = Parts { method, model, shape, candidates: Vec::new() };
     assemble(input, result, prepared, &fit)
@@ -96,7 +112,7 @@ fn robust(
     fit: &Fit,
     candidates: Vec<Candidate>,
 ) -> Result<Calibration, Error> {
-    let shape = model.shape(input.tables).ok_or(Error::NoTables { model })?;
+    let shape = model.shape(input.tables, prepared.surface).ok_or(Error::NoTables { model })?;
     let halves = [0, 1].map(|first| auto::half_focal_px(input, &prepared, shape, fit, first));
     let distortion = distortion::test(input, &prepared);
     let parts = Parts { method, model, shape, candidates };
@@ -130,19 +146,29 @@ fn assemble(
         let known = (n_pictures >= MIN_PICTURES && focal.sigma.is_finite()).then_some(focal);
         auto::underdetermined(&prepared, known)
     };
-    let covariance = fit.covariance.clone().filter(|_| enough).ok_or_else(undetermined)?;
+    let whole = fit.covariance.as_ref().filter(|_| enough).ok_or_else(undetermined)?;
+    let names = shape.names();
+    let n = fit.free.len();
+    let covariance =
+        (0..names.len()).flat_map(|i| whole[i * n..i * n + names.len()].iter().copied()).collect();
+    let surface_m = shape.surface_numbers(&fit.free);
     let camera = shape.camera(input.factory, input.tables, &fit.free);
     let mut views = Vec::with_capacity(prepared.views.len());
     let (mut squares, mut n_corners) = (0.0, 0);
     for (view, pose) in prepared.views.iter().zip(&fit.poses) {
-        let view = View::at_pose(view.frame, input.board, &camera, &view.corners, *pose)
+        let points: Vec<Point<Board>> = view
+            .points
+            .iter()
+            .zip(&view.modes)
+            .map(|(point, modes)| surface::lifted(point, modes, surface_m))
+            .collect();
+        let view = View::at_pose_of(view.frame, &points, &camera, &view.corners, *pose)
             .map_err(|_| undetermined())?;
         squares += view.rms_px * view.rms_px * view.corners.len() as f64;
         n_corners += view.corners.len();
         views.push(view);
     }
-    let parameters = shape
-        .names()
+    let parameters = names
         .into_iter()
         .enumerate()
         .map(|(i, name)| Parameter { name, estimate: fit.estimate(i) })
@@ -159,6 +185,7 @@ fn assemble(
         candidates,
         split_half_focal_px: None,
         distortion: None,
+        surface: surface::board_surface(input.board, surface_m, whole, n),
         outliers: prepared.outliers,
         rejected: prepared.rejected,
     })

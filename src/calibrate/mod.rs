@@ -7,7 +7,9 @@
 //!
 //! Every σ is the larger of two: the classical one (independent corner noise, its size taken from the residuals) and
 //! one that lets residuals of the same picture be correlated in any way, as those of a board that is not quite flat
-//! are ([`solve::clustered`](crate::solve::clustered)).
+//! are ([`solve::clustered`](crate::solve::clustered)). What is wrong the same way in *every* picture neither of them
+//! sees; the shape of the board is that, and is therefore estimated with the camera ([`BoardSurface`]) where held-out
+//! pictures ask for it.
 //!
 //! ```
 //! use truedepth::board::CharucoBoard;
@@ -36,9 +38,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! Not here: images, files, verdicts; the board's own shape.
+//! Not here: images, files, verdicts.
 
 mod model;
+
+mod surface;
 
 mod problem;
 
@@ -56,6 +60,12 @@ mod job;
 
 #[cfg(test)]
 mod golden;
+
+#[cfg(test)]
+mod synthetic;
+
+#[cfg(test)]
+mod tests;
 
 pub use job::calibrate;
 pub use model::Model;
@@ -118,7 +128,7 @@ pub struct Calibration {
     pub parameters: Vec<Parameter>,
     /// Covariance of `parameters` (row-major), poses marginalised.
     pub covariance: Vec<f64>,
-    /// Views used, by frame, with the corners that took part.
+    /// Views used, by frame, with the corners that took part; residuals against the board's `surface`.
     pub views: Vec<View>,
     /// How many different pictures these views are: views whose corners lie within 4 % of the image's width of each
     /// other count once.
@@ -132,6 +142,8 @@ pub struct Calibration {
     /// How much distortion is left in the stream; not with [`Method::Paper`] and [`Method::Plain`], and `None` where
     /// the views do not determine it.
     pub distortion: Option<DistortionTest>,
+    /// The board's shape, where held-out pictures are predicted better with it than with a flat board.
+    pub surface: Option<BoardSurface>,
     /// Corners left out.
     pub outliers: Vec<Outlier>,
     /// Frames left out, by frame.
@@ -153,6 +165,24 @@ impl Calibration {
     pub fn focal_px(&self) -> Estimate {
         self.parameter("focal_px")
             .unwrap_or(Estimate { value: self.camera.intrinsics.fx, sigma: f64::INFINITY })
+    }
+}
+
+/// How a board deviates from flat: a smooth surface (polynomials of degree 2 to 4) estimated with the camera.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BoardSurface {
+    /// Height of each corner, by id, metres: along the board's z, *into* the board; the best plane is taken out.
+    pub heights_m: Vec<f64>,
+    /// Their standard deviations, metres.
+    pub sigmas_m: Vec<f64>,
+}
+
+impl BoardSurface {
+    /// From the lowest to the highest corner, metres.
+    pub fn peak_to_valley_m(&self) -> f64 {
+        let high = self.heights_m.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let low = self.heights_m.iter().copied().fold(f64::INFINITY, f64::min);
+        high - low
     }
 }
 
@@ -276,6 +306,8 @@ pub struct Hypothesis {
     pub lens: Lens,
     /// RMS of the residuals, 2-D distance, pixels.
     pub rms_px: f64,
+    /// The same with the board taken for flat.
+    pub flat_rms_px: f64,
     /// As [`Candidate::held_out_rms_px`].
     pub held_out_rms_px: f64,
     /// Focal length under it.

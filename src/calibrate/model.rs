@@ -1,5 +1,6 @@
 //! Which parameters are free.
 
+use super::surface::Surface;
 use crate::camera::{Brown, Camera, Distortion, Intrinsics, RadialTable, TablePair};
 
 /// Which parameters are free. In order of preference: where two predict equally well, the first is taken.
@@ -39,18 +40,15 @@ impl Model {
     }
 
     /// Its shape; `None` where it needs a table and there is none.
-    pub(super) fn shape(self, tables: Option<&TablePair>) -> Option<Shape<'_>> {
-        Some(match self {
-            Self::Focal => Shape { center: Center::Fixed, warp: Warp::None },
-            Self::FocalCentre => Shape { center: Center::Free, warp: Warp::None },
-            Self::FocalTable => {
-                Shape { center: Center::Fixed, warp: Warp::Table(&tables?.inverse) }
-            }
-            Self::FocalTableCentre => {
-                Shape { center: Center::Free, warp: Warp::Table(&tables?.inverse) }
-            }
-            Self::Brown => Shape { center: Center::Free, warp: Warp::FreeBrown },
-        })
+    pub(super) fn shape(self, tables: Option<&TablePair>, surface: Surface) -> Option<Shape<'_>> {
+        let (center, warp) = match self {
+            Self::Focal => (Center::Fixed, Warp::None),
+            Self::FocalCentre => (Center::Free, Warp::None),
+            Self::FocalTable => (Center::Fixed, Warp::Table(&tables?.inverse)),
+            Self::FocalTableCentre => (Center::Free, Warp::Table(&tables?.inverse)),
+            Self::Brown => (Center::Free, Warp::FreeBrown),
+        };
+        Some(Shape { center, warp, surface })
     }
 }
 
@@ -78,15 +76,16 @@ pub(super) enum Warp<'a> {
 }
 
 /// A camera with some of its numbers free. The free ones are, in order: focal length along x; principal point x, y
-/// (where free); those of the warp.
+/// (where free); those of the warp; the board's surface (where free).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Shape<'a> {
     pub(super) center: Center,
     pub(super) warp: Warp<'a>,
+    pub(super) surface: Surface,
 }
 
 impl Shape<'_> {
-    /// Names of the free numbers.
+    /// Names of the free numbers of the camera.
     pub(super) fn names(&self) -> Vec<&'static str> {
         let mut names = vec!["focal_px"];
         if self.center == Center::Free {
@@ -108,7 +107,7 @@ impl Shape<'_> {
         if self.center == Center::Free {
             start.extend([intrinsics.cx, intrinsics.cy]);
         }
-        start.resize(self.names().len(), 0.0);
+        start.resize(self.names().len() + self.surface.n_modes(), 0.0);
         start
     }
 
@@ -123,10 +122,16 @@ impl Shape<'_> {
 
     /// The free numbers of the warp.
     pub(super) fn warp_numbers<'f>(&self, free: &'f [f64]) -> &'f [f64] {
-        match self.center {
-            Center::Fixed => &free[1..],
-            Center::Free => &free[3..],
-        }
+        let first = match self.center {
+            Center::Fixed => 1,
+            Center::Free => 3,
+        };
+        &free[first..free.len() - self.surface.n_modes()]
+    }
+
+    /// The free numbers of the board's surface, metres.
+    pub(super) fn surface_numbers<'f>(&self, free: &'f [f64]) -> &'f [f64] {
+        &free[free.len() - self.surface.n_modes()..]
     }
 
     /// The camera with these numbers.

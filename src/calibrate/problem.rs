@@ -1,6 +1,9 @@
 //! Reprojection as a bordered least-squares problem: intrinsics shared, one pose per view.
 
-use super::model::{Center, Shape, Warp, brown};
+use super::{
+    model::{Center, Shape, Warp, brown},
+    surface::{N_MODES, lifted},
+};
 use crate::{
     camera::{Brown, Intrinsics, RadialTable},
     detect::Corner,
@@ -16,6 +19,8 @@ pub(super) struct Measured {
     pub(super) corners: Vec<Corner>,
     /// Where each corner lies on the board, metres.
     pub(super) points: Vec<Vector3<f64>>,
+    /// The modes of the board's surface there.
+    pub(super) modes: Vec<[f64; N_MODES]>,
     /// The inverse variance of both its coordinates, 1/px².
     pub(super) weights: Vec<f64>,
     /// Where the board stands, as far as known.
@@ -27,6 +32,8 @@ pub(super) struct Reprojection<'a, const S: usize> {
     pub(super) factory: &'a Intrinsics,
     pub(super) views: &'a [&'a Measured],
     pub(super) loss: Loss,
+    /// The σ of each mode of the board's surface beforehand, metres.
+    pub(super) surface_sigma_m: f64,
 }
 
 /// A pixel and its derivatives.
@@ -41,6 +48,7 @@ struct Ready<'a> {
     pinhole: Intrinsics,
     aspect: f64,
     center: Center,
+    n_warp: usize,
     lens: ReadyLens<'a>,
 }
 
@@ -68,6 +76,7 @@ impl<'a, const S: usize> Reprojection<'a, S> {
             pinhole: self.shape.intrinsics(self.factory, shared),
             aspect: self.factory.fy / self.factory.fx,
             center: self.shape.center,
+            n_warp: numbers.len(),
             lens,
         }
     }
@@ -105,15 +114,15 @@ impl Ready<'_> {
                 let [[a, b], [c, d]] = j;
                 let [x, y] = pixel - whole.center;
                 let m = whole.magnification_at(x.hypot(y));
-                by_shared[0][S - 1] = -m * (a * x + b * y);
-                by_shared[1][S - 1] = -m * (c * x + d * y);
+                by_shared[0][3] = -m * (a * x + b * y);
+                by_shared[1][3] = -m * (c * x + d * y);
                 ([pixel.x, pixel.y], [[a * fx, b * fy], [c * fx, d * fy]])
             }
             ReadyLens::Brown(brown) => {
                 let distorted @ [x, y] = brown.distort([u, v])?;
                 self.by_pinhole(&mut by_shared, distorted, None);
                 let [k_x, k_y] = brown.d_distorted_d_parameters([u, v]);
-                for (i, (k_x, k_y)) in k_x.into_iter().zip(k_y).take(S - 3).enumerate() {
+                for (i, (k_x, k_y)) in k_x.into_iter().zip(k_y).take(self.n_warp).enumerate() {
                     by_shared[0][3 + i] = fx * k_x;
                     by_shared[1][3 + i] = fy * k_y;
                 }
@@ -165,21 +174,38 @@ impl<const S: usize> Bordered<S, 6> for Reprojection<'_, S> {
         let ready = self.ready(shared);
         let view = self.views[index];
         let rotation = pose.rotation.matrix();
-        for ((corner, point), &weight) in view.corners.iter().zip(&view.points).zip(&view.weights) {
-            let turned = rotation * point;
-            let Some(drawn) = ready.project::<S>(&(turned + pose.translation)) else {
+        let normal_axis = rotation.column(2).into_owned();
+        let surface = self.shape.surface_numbers(shared);
+        let first_mode = S - surface.len();
+        for (index, corner) in view.corners.iter().enumerate() {
+            let modes = &view.modes[index];
+            let turned = rotation * lifted(&view.points[index], modes, surface).coords;
+            let Some(mut drawn) = ready.project::<S>(&(turned + pose.translation)) else {
                 return false;
             };
             let [dx, dy] = [corner.pixel.x - drawn.pixel[0], corner.pixel.y - drawn.pixel[1]];
-            let square = weight * (dx * dx + dy * dy);
-            let weight = weight * self.loss.weight(square);
+            let square = view.weights[index] * (dx * dx + dy * dy);
+            let weight = view.weights[index] * self.loss.weight(square);
             normal.add_cost(0.5 * self.loss.rho(square));
             for (residual, row) in [(dx, 0), (dy, 1)] {
-                let by_pose = pose::d_pixel_d_pose(drawn.by_point[row], &turned);
+                let by_point = drawn.by_point[row];
+                let by_height = by_point[0] * normal_axis.x
+                    + by_point[1] * normal_axis.y
+                    + by_point[2] * normal_axis.z;
+                for (derivative, mode) in drawn.by_shared[row][first_mode..].iter_mut().zip(modes) {
+                    *derivative = by_height * mode;
+                }
+                let by_pose = pose::d_pixel_d_pose(by_point, &turned);
                 normal.add_row(weight, residual, &drawn.by_shared[row], &by_pose);
             }
         }
         true
+    }
+
+    fn shared_precision(&self) -> [f64; S] {
+        let first_mode = S - self.shape.surface.n_modes();
+        let precision = 1.0 / (self.surface_sigma_m * self.surface_sigma_m);
+        std::array::from_fn(|i| if i < first_mode { 0.0 } else { precision })
     }
 
     fn advance_block(&self, pose: &Self::Block, step: &[f64; 6]) -> Self::Block {
@@ -188,9 +214,10 @@ impl<const S: usize> Bordered<S, 6> for Reprojection<'_, S> {
 }
 
 #[cfg(test)]
+#[allow(clippy::needless_range_loop, reason = "rows and columns of a Jacobian read as such")]
 mod tests {
     use super::*;
-    use crate::geom::Rotation;
+    use crate::{calibrate::surface::Surface, geom::Rotation};
 
     #[test]
     fn jacobians_match_differences() {
@@ -198,25 +225,26 @@ mod tests {
             Intrinsics { fx: 436.5, fy: 441.25, cx: 321.6, cy: 238.4, width: 640, height: 480 };
         let table = (0..42).map(|i| -0.002 + 0.06 * (f64::from(i) / 41.0).powi(3)).collect();
         let table = RadialTable::new(Pixel::new(324.1, 236.9), 403.0, table).unwrap();
-        check(&factory, Shape { center: Center::Fixed, warp: Warp::None }, [450.0]);
-        check(&factory, Shape { center: Center::Fixed, warp: Warp::Table(&table) }, [450.0]);
-        check(&factory, Shape { center: Center::Free, warp: Warp::None }, [450.0, 318.0, 243.0]);
-        let shape = Shape { center: Center::Free, warp: Warp::Table(&table) };
-        check(&factory, shape, [450.0, 318.0, 243.0]);
-        let shape = Shape { center: Center::Free, warp: Warp::FreeTable(&table) };
-        check(&factory, shape, [450.0, 318.0, 243.0, 0.6]);
-        let shape = Shape { center: Center::Free, warp: Warp::FreeRadial1 };
-        check(&factory, shape, [450.0, 318.0, 243.0, 0.07]);
-        let shape = Shape { center: Center::Free, warp: Warp::FreeRadial2 };
-        check(&factory, shape, [450.0, 318.0, 243.0, 0.07, -0.1]);
-        let shape = Shape { center: Center::Free, warp: Warp::FreeBrown };
-        check(&factory, shape, [450.0, 318.0, 243.0, 0.07, -0.1, 0.001, -0.002, 0.03]);
+        check(&factory, shape(Center::Fixed, Warp::None), [450.0]);
+        check(&factory, shape(Center::Fixed, Warp::Table(&table)), [450.0]);
+        check(&factory, shape(Center::Free, Warp::None), [450.0, 318.0, 243.0]);
+        check(&factory, shape(Center::Free, Warp::Table(&table)), [450.0, 318.0, 243.0]);
+        check(&factory, shape(Center::Free, Warp::FreeTable(&table)), [450.0, 318.0, 243.0, 0.6]);
+        check(&factory, shape(Center::Free, Warp::FreeRadial1), [450.0, 318.0, 243.0, 0.07]);
+        check(&factory, shape(Center::Free, Warp::FreeRadial2), [450.0, 318.0, 243.0, 0.07, -0.1]);
+        let brown = shape(Center::Free, Warp::FreeBrown);
+        check(&factory, brown, [450.0, 318.0, 243.0, 0.07, -0.1, 0.001, -0.002, 0.03]);
+    }
+
+    fn shape(center: Center, warp: Warp<'_>) -> Shape<'_> {
+        Shape { center, warp, surface: Surface::Flat }
     }
 
     /// Against differences, and against the camera of the same numbers.
     fn check<const S: usize>(factory: &Intrinsics, shape: Shape<'_>, shared: [f64; S]) {
         assert_eq!(shape.names().len(), S);
-        let problem = Reprojection { shape, factory, views: &[], loss: Loss::Squared };
+        let problem =
+            Reprojection { shape, factory, views: &[], loss: Loss::Squared, surface_sigma_m: 1e-3 };
         let camera = shape.camera(factory, None, &shared);
         let turn = Rotation::from_scaled_axis(Vector3::new(0.4, -0.3, 0.2));
         for i in 0..40 {

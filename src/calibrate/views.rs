@@ -1,6 +1,6 @@
 //! Which frames take part.
 
-use super::{Error, FrameCorners, Input, RejectedFrame, Rejection, problem::Measured};
+use super::{Error, FrameCorners, Input, RejectedFrame, Rejection, problem::Measured, surface};
 use crate::{
     board::CharucoBoard,
     camera::{Camera, Distortion},
@@ -128,9 +128,10 @@ fn measured(
     corners: Vec<Corner>,
     pose: Pose<Color, Board>,
 ) -> Measured {
-    let points = corners.iter().map(|c| board.corner(c.id).coords).collect();
+    let points: Vec<_> = corners.iter().map(|c| board.corner(c.id).coords).collect();
+    let modes = points.iter().map(|point| surface::modes(board, point)).collect();
     let weights = vec![1.0; corners.len()];
-    Measured { frame, corners, points, weights, pose }
+    Measured { frame, corners, points, modes, weights, pose }
 }
 
 /// For each view the number of the picture it is one of: views that show the board in nearly the same place count

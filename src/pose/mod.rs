@@ -35,7 +35,7 @@ use crate::{
     board::CharucoBoard,
     camera::Camera,
     detect::Corner,
-    geom::{Board, Color, Pose, Vector3},
+    geom::{Board, Color, Point, Pose, Vector3},
 };
 
 /// The board seen in one frame.
@@ -189,11 +189,23 @@ impl View {
         corners: &[Corner],
         color_from_board: Pose<Color, Board>,
     ) -> Result<Self, Error> {
+        let points: Vec<Point<Board>> = corners.iter().map(|c| board.corner(c.id)).collect();
+        Self::at_pose_of(frame, &points, camera, corners, color_from_board)
+    }
+
+    /// As [`at_pose`](Self::at_pose), with the place of each corner on a board that need not be flat.
+    pub fn at_pose_of(
+        frame: usize,
+        points: &[Point<Board>],
+        camera: &Camera,
+        corners: &[Corner],
+        color_from_board: Pose<Color, Board>,
+    ) -> Result<Self, Error> {
         let mut residuals_px = Vec::with_capacity(corners.len());
         let mut squares = 0.0;
-        for &Corner { id, pixel, .. } in corners {
+        for (&Corner { id, pixel, .. }, &point) in corners.iter().zip(points) {
             let projected = camera
-                .project(color_from_board * board.corner(id))
+                .project(color_from_board * point)
                 .ok_or(Error::OutsideCamera { frame, id, x_px: pixel.x, y_px: pixel.y })?;
             let residual = pixel - projected;
             squares += residual[0] * residual[0] + residual[1] * residual[1];

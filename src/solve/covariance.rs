@@ -15,14 +15,14 @@ pub fn total<const S: usize>(parts: &[Reduced<S>]) -> Reduced<S> {
     })
 }
 
-/// The covariance of the shared parameters if all residuals are independent with this variance; `None` where the
-/// parameters are not determined.
+/// The covariance of the shared parameters if all residuals are independent with this variance, from the sum of what
+/// all parts (and what was known beforehand) say; `None` where the parameters are not determined.
 ///
 /// ```text
-/// C = variance·(Σ Sᵢ)⁻¹
+/// C = variance·S⁻¹,   S = Σ Sᵢ (+ prior)
 /// ```
-pub fn classical<const S: usize>(parts: &[Reduced<S>], variance: f64) -> Option<[[f64; S]; S]> {
-    let mut covariance = Cholesky::new(&total(parts).information)?.inverse();
+pub fn classical<const S: usize>(all: &Reduced<S>, variance: f64) -> Option<[[f64; S]; S]> {
+    let mut covariance = Cholesky::new(&all.information)?.inverse();
     covariance.iter_mut().flatten().for_each(|c| *c *= variance);
     Some(covariance)
 }
@@ -34,10 +34,10 @@ pub fn classical<const S: usize>(parts: &[Reduced<S>], variance: f64) -> Option<
 /// regression with multi-stage samples*, 2002), unbiased where the residuals happen to be independent after all:
 ///
 /// ```text
-/// S = ΣSᵢ = L·Lᵀ,  Mᵢ = L⁻¹·Sᵢ·L⁻ᵀ,  uᵢ = (1 − Mᵢ)^(−½)·L⁻¹·scoreᵢ,  C = L⁻ᵀ·(Σ uᵢ·uᵢᵀ)·L⁻¹
+/// S = ΣSᵢ (+ prior) = L·Lᵀ,  Mᵢ = L⁻¹·Sᵢ·L⁻ᵀ,  uᵢ = (1 − Mᵢ)^(−½)·L⁻¹·scoreᵢ,  C = L⁻ᵀ·(Σ uᵢ·uᵢᵀ)·L⁻¹
 /// ```
-pub fn clustered<const S: usize>(parts: &[Reduced<S>]) -> Option<[[f64; S]; S]> {
-    let factor = Cholesky::new(&total(parts).information)?;
+pub fn clustered<const S: usize>(all: &Reduced<S>, parts: &[Reduced<S>]) -> Option<[[f64; S]; S]> {
+    let factor = Cholesky::new(&all.information)?;
     let mut meat = [[0.0; S]; S];
     for part in parts {
         // M = L⁻¹·Sᵢ·L⁻ᵀ, column by column and then row by row.
@@ -98,8 +98,10 @@ pub fn larger<const S: usize>(
 /// ```
 ///
 /// Exact for linear problems.
-pub fn leave_one_out_rise<const S: usize>(parts: &[Reduced<S>]) -> Vec<Option<f64>> {
-    let all = total(parts);
+pub fn leave_one_out_rise<const S: usize>(
+    all: &Reduced<S>,
+    parts: &[Reduced<S>],
+) -> Vec<Option<f64>> {
     parts
         .iter()
         .map(|part| {
@@ -225,16 +227,16 @@ mod tests {
     #[test]
     fn covariances_are_unbiased() {
         // Variance of a mean of 4000 squares: ±2.2 % each, so 9 % is four standard deviations.
-        for r in ratio(0.5, 0.0, |parts| classical(parts, 0.25).unwrap()) {
+        for r in ratio(0.5, 0.0, |parts| classical(&total(parts), 0.25).unwrap()) {
             assert!((r - 1.0).abs() < 0.09, "classical {r}");
         }
-        for r in ratio(0.5, 0.0, |parts| clustered(parts).unwrap()) {
+        for r in ratio(0.5, 0.0, |parts| clustered(&total(parts), parts).unwrap()) {
             assert!((r - 1.0).abs() < 0.09, "clustered, independent noise {r}");
         }
-        for r in ratio(0.1, 0.5, |parts| clustered(parts).unwrap()) {
+        for r in ratio(0.1, 0.5, |parts| clustered(&total(parts), parts).unwrap()) {
             assert!((r - 1.0).abs() < 0.2, "clustered, common noise {r}");
         }
-        for r in ratio(0.1, 0.5, |parts| classical(parts, 0.26).unwrap()) {
+        for r in ratio(0.1, 0.5, |parts| classical(&total(parts), 0.26).unwrap()) {
             assert!(r < 0.4, "the classical one must be far too small here: {r}");
         }
     }
@@ -249,7 +251,7 @@ mod tests {
     fn leaving_one_out_is_exact_for_a_line() {
         let groups = groups(3, 0.5, 0.3);
         let (parts, _, squares) = line(&groups);
-        for (i, rise) in leave_one_out_rise(&parts).into_iter().enumerate() {
+        for (i, rise) in leave_one_out_rise(&total(&parts), &parts).into_iter().enumerate() {
             let others: Vec<_> = groups
                 .iter()
                 .enumerate()
@@ -261,7 +263,7 @@ mod tests {
             assert!((squares[i] + rise.unwrap() - held_out).abs() < 1e-10);
         }
         let alone = line(&groups[..1]).0;
-        assert!(leave_one_out_rise(&alone)[0].is_none());
-        assert!(clustered(&alone).is_none());
+        assert!(leave_one_out_rise(&total(&alone), &alone)[0].is_none());
+        assert!(clustered(&total(&alone), &alone).is_none());
     }
 }

@@ -53,5 +53,5 @@ pub use cholesky::Cholesky;
 pub use covariance::{classical, clustered, larger, leave_one_out_rise, total};
 pub use lm::{Effort, LeastSquares, Minimum, Solution, minimize};
 pub use loss::Loss;
-pub use schur::{Arrow, BlockNormal, Bordered, BySchur, Reduced};
+pub use schur::{Arrow, ArrowNormal, BlockNormal, Bordered, BySchur, Reduced};
 pub use stats::{mad_sigma, mean, median, quantile, rms, standard_deviation, standard_error};

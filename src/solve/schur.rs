@@ -31,6 +31,11 @@ pub trait Bordered<const S: usize, const B: usize> {
         normal: &mut BlockNormal<S, B>,
     ) -> bool;
 
+    /// The precision (1/σ²) with which each shared parameter is known to be near zero beforehand; 0 for not at all.
+    fn shared_precision(&self) -> [f64; S] {
+        [0.0; S]
+    }
+
     /// `block` moved by a step of its tangent space.
     fn advance_block(&self, block: &Self::Block, step: &[f64; B]) -> Self::Block;
 }
@@ -188,31 +193,52 @@ pub struct Arrow<const S: usize, T> {
     pub blocks: Vec<T>,
 }
 
+/// The normal equations of a [`Bordered`] problem.
+#[derive(Clone, Debug)]
+pub struct ArrowNormal<const S: usize, const B: usize> {
+    /// What each block contributes.
+    pub blocks: Vec<BlockNormal<S, B>>,
+    /// What is known beforehand.
+    pub prior: Reduced<S>,
+    prior_cost: f64,
+}
+
 /// A [`Bordered`] problem as [`minimize`](super::minimize) takes it.
 #[derive(Clone, Copy, Debug)]
 pub struct BySchur<'a, P, const S: usize, const B: usize>(pub &'a P);
 
 impl<P: Bordered<S, B>, const S: usize, const B: usize> LeastSquares for BySchur<'_, P, S, B> {
     type State = Arrow<S, P::Block>;
-    type Normal = Vec<BlockNormal<S, B>>;
+    type Normal = ArrowNormal<S, B>;
     type Step = Arrow<S, [f64; B]>;
 
     fn linearize(&self, state: &Self::State) -> Option<Self::Normal> {
-        let mut normal = vec![BlockNormal::ZERO; state.blocks.len()];
-        for (index, (block, normal)) in state.blocks.iter().zip(&mut normal).enumerate() {
+        let mut blocks = vec![BlockNormal::ZERO; state.blocks.len()];
+        for (index, (block, normal)) in state.blocks.iter().zip(&mut blocks).enumerate() {
             if !self.0.linearize_block(index, &state.shared, block, normal) {
                 return None;
             }
         }
-        Some(normal)
+        let mut prior = Reduced::ZERO;
+        let mut prior_cost = 0.0;
+        for (i, precision) in self.0.shared_precision().into_iter().enumerate() {
+            prior.information[i][i] = precision;
+            prior.score[i] = -precision * state.shared[i];
+            prior_cost += 0.5 * precision * state.shared[i] * state.shared[i];
+        }
+        Some(ArrowNormal { blocks, prior, prior_cost })
     }
 
     fn cost(&self, normal: &Self::Normal) -> f64 {
-        normal.iter().map(BlockNormal::cost).sum()
+        normal.prior_cost + normal.blocks.iter().map(BlockNormal::cost).sum::<f64>()
     }
 
     fn solve(&self, normal: &Self::Normal, damping: f64) -> Option<Solution<Self::Step>> {
-        let mut total = Reduced::<S>::ZERO;
+        let ArrowNormal { blocks: normal, prior, .. } = normal;
+        let mut total = *prior;
+        for i in 0..S {
+            total.information[i][i] *= 1.0 + damping;
+        }
         let mut eliminated = Vec::with_capacity(normal.len());
         for block in normal {
             let block = block.eliminate(damping)?;
@@ -223,6 +249,10 @@ impl<P: Bordered<S, B>, const S: usize, const B: usize> LeastSquares for BySchur
         let mut blocks = Vec::with_capacity(normal.len());
         // ½·δᵀ·(damping·D·δ + g): what the linear model says (Madsen, Nielsen, Tingleff 2004, equation 3.14).
         let mut decrease = 0.0;
+        for i in 0..S {
+            let damped = damping * prior.information[i][i] * shared[i];
+            decrease += shared[i] * (damped + prior.score[i]);
+        }
         for (block, Eliminated { factor, y, z, .. }) in normal.iter().zip(&eliminated) {
             let mut rest = *z;
             for i in 0..S {
@@ -263,6 +293,7 @@ mod tests {
 
     /// Curves y = aᵢ·exp(−k·t) + bᵢ + c·t²: k and c shared, a and b of each curve its own.
     struct Decays {
+        precision: [f64; 2],
         curves: Vec<Vec<(f64, f64)>>,
     }
 
@@ -285,6 +316,10 @@ mod tests {
             k > 0.0
         }
 
+        fn shared_precision(&self) -> [f64; 2] {
+            self.precision
+        }
+
         fn advance_block(&self, block: &[f64; 2], step: &[f64; 2]) -> [f64; 2] {
             [block[0] + step[0], block[1] + step[1]]
         }
@@ -305,7 +340,10 @@ mod tests {
                     .collect()
             })
             .collect();
-        (Decays { curves }, Arrow { shared: [0.4, 0.0], blocks: vec![[1.0, 0.0]; 3] })
+        (
+            Decays { precision: [0.0; 2], curves },
+            Arrow { shared: [0.4, 0.0], blocks: vec![[1.0, 0.0]; 3] },
+        )
     }
 
     #[test]
@@ -321,14 +359,16 @@ mod tests {
     /// One step of the arrow against the same equations solved whole.
     #[test]
     fn step_solves_the_whole_system() {
-        let (problem, start) = decays(0.01);
+        let (mut problem, mut start) = decays(0.01);
+        problem.precision[1] = 7.0;
+        start.shared[1] = 0.2;
         let problem = BySchur(&problem);
         let normal = problem.linearize(&start).unwrap();
         for damping in [0.0, 0.3] {
             let Solution { step, predicted_decrease } = problem.solve(&normal, damping).unwrap();
             let mut whole = [[0.0; 8]; 8];
             let mut right = [0.0; 8];
-            for (index, block) in normal.iter().enumerate() {
+            for (index, block) in normal.blocks.iter().enumerate() {
                 let at = 2 + 2 * index;
                 for i in 0..2 {
                     right[i] += block.g[i];
@@ -341,6 +381,8 @@ mod tests {
                     }
                 }
             }
+            whole[1][1] += 7.0;
+            right[1] -= 7.0 * start.shared[1];
             let undamped = whole;
             for i in 0..8 {
                 whole[i][i] *= 1.0 + damping;
@@ -368,7 +410,7 @@ mod tests {
         let minimum = minimize(&BySchur(&problem), start, Effort::default()).unwrap();
         assert!(minimum.converged);
         let mut total = Reduced::ZERO;
-        for block in &minimum.normal {
+        for block in &minimum.normal.blocks {
             total.add(&block.reduce().unwrap());
         }
         assert!(total.score.iter().all(|s| s.abs() < 1e-6), "{total:?}");
