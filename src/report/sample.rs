@@ -172,6 +172,7 @@ fn calibration(frames: &[FrameAudit]) -> Calibration {
         split_half_focal_px: Some([estimate(529.6, 0.52), estimate(530.4, 0.49)]),
         outliers: vec![Outlier { frame: 3, id: 61, residual_px: 2.31, residual_sigmas: 9.4 }],
         distortion: None,
+        surface: None,
         rejected: Vec::new(),
     }
 }
