@@ -11,56 +11,58 @@
 //! Conventions (pixel centres at integers, metres, NaN for "no measurement", `a_from_b`) are stated once, in
 //! `CONVENTIONS.md`.
 
-// Ground: shapes and numbers.
+// Comments, not docs: rustdoc shows the sentence on each room's own door.
 
-/// Points, pixels, poses and homographies, with frames as types.
+// ── Ground: shapes and numbers ──
+
+// Points, pixels, poses and homographies, with frames as types.
 pub mod geom;
 
-/// Least squares, robust losses, covariance and statistics; knows no cameras.
+// Least squares, robust losses, covariance and statistics; knows no cameras.
 pub mod solve;
 
-// What exists.
+// ── What exists ──
 
-/// Grey, colour and depth images, and how to sample them.
+// Grey, colour and depth images, and how to sample them.
 pub mod image;
 
-/// Camera models: one file per model.
+// Camera models: one file per model.
 pub mod camera;
 
-/// The printed target: dictionaries and ChArUco geometry.
+// The printed target: dictionaries and ChArUco geometry.
 pub mod board;
 
-// What was seen.
+// ── What was seen ──
 
-/// Recordings as the capture apps write them: frames paired by time, factory metadata, limits.
+// Recordings as the capture apps write them: frames paired by time, factory metadata, limits.
 pub mod recording;
 
-/// ChArUco corners of an image, each with its own uncertainty.
+// ChArUco corners of an image, each with its own uncertainty.
 pub mod detect;
 
-// What follows.
+// ── What follows ──
 
-/// Where the board stood in front of the camera.
+// Where the board stood in front of the camera.
 pub mod pose;
 
-/// Intrinsics from many views, with uncertainties.
+// Intrinsics from many views, with uncertainties.
 pub mod calibrate;
 
-/// Sensor depth against the depth of the board.
+// Sensor depth against the depth of the board.
 pub mod depth;
 
-// Judgement.
+// ── Judgement ──
 
-/// Findings: what is wrong, by how much, how sure.
+// Findings: what is wrong, by how much, how sure.
 pub mod diagnose;
 
-/// The main job: a recording in, everything that can be known of it out.
+// The main job: a recording in, everything that can be known of it out.
 pub mod audit;
 
-// What leaves.
+// ── What leaves ──
 
-/// Synthetic recordings with ground truth and chosen faults.
+// Synthetic recordings with ground truth and chosen faults.
 pub mod simulate;
 
-/// What leaves the library: JSON, HTML, SVG.
+// What leaves the library: JSON, HTML, SVG.
 pub mod report;

@@ -42,6 +42,7 @@ pub(super) fn is_telltale(name: &str) -> bool {
 }
 
 /// Whether this format has a file of this name.
+#[cfg(feature = "fs")]
 pub(super) fn is_ours(name: &str) -> bool {
     is_telltale(name) || [CAMERA_METADATA, BOARD, CHECKER_SIZE].contains(&name)
 }
