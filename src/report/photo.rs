@@ -31,6 +31,23 @@ impl Photo {
         Ok(Self::new(frame, &recording.rgb(frame)?))
     }
 
+    /// Reads the colour images of several frames, on all cores where the feature `parallel` is on.
+    ///
+    /// Errors: as [`Recording::rgb`], of the first frame that has one.
+    pub fn read_all(
+        recording: &Recording,
+        frames: &[usize],
+    ) -> Result<Vec<Self>, recording::Error> {
+        #[cfg(feature = "parallel")]
+        let photos: Vec<_> = {
+            use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
+            frames.par_iter().map(|&frame| Self::read(recording, frame)).collect()
+        };
+        #[cfg(not(feature = "parallel"))]
+        let photos: Vec<_> = frames.iter().map(|&frame| Self::read(recording, frame)).collect();
+        photos.into_iter().collect()
+    }
+
     /// The photo of an image. Panics where the image has no pixels.
     pub fn new(frame: usize, image: &Rgb) -> Self {
         let small = shrunk(image, image.width().div_ceil(MAX_WIDTH));
