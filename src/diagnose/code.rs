@@ -37,14 +37,14 @@ macro_rules! codes {
 }
 
 codes! {
-    TD101, "td101_files", "Frames and metadata belong together";
+    TD101, "td101_files", "Files and pairing";
     TD201, "td201_focal_length", "Focal length";
-    TD203, "td203_not_rectified", "Stream rectified";
+    TD203, "td203_not_rectified", "Lens distortion in the images";
     TD301, "td301_depth_scale", "Depth scale";
     TD302, "td302_depth_bias", "Depth bias";
-    TD403, "td403_mirrored", "Images mirrored";
+    TD403, "td403_mirrored", "Mirroring";
     TD501, "td501_distortion_centre", "Principal point and distortion centre";
-    TD503, "td503_intrinsics_size", "Intrinsics at image size";
+    TD503, "td503_intrinsics_size", "Size the intrinsics are for";
     TD504, "td504_field_of_view", "Field of view";
 }
 

@@ -5,7 +5,10 @@ use super::photo::Photo;
 use crate::{
     audit::{Audit, FrameAudit, Method},
     board::{CharucoBoard, Layout},
-    calibrate::{self, Calibration, Candidate, Estimate, Model, Outlier, Parameter},
+    calibrate::{
+        self, Calibration, Candidate, DistortionTest, Estimate, Hypothesis, Lens, Model, Outlier,
+        Parameter, RejectedFrame, Rejection,
+    },
     camera::{Camera, Distortion, Intrinsics},
     depth::against_board,
     detect::{Corner, Identity, Observation, Reason, Reject},
@@ -147,7 +150,13 @@ fn calibration(frames: &[FrameAudit]) -> Calibration {
         model,
         rms_px,
         held_out_rms_px,
-        behind_best_sigmas: 0.0,
+        behind_best_sigmas: if model == Model::FocalCentre { 0.0 } else { 2.5 },
+        focal_px,
+    };
+    let hypothesis = |lens, rms_px, focal_px| Hypothesis {
+        lens,
+        rms_px,
+        held_out_rms_px: 1.07 * rms_px,
         focal_px,
     };
     Calibration {
@@ -161,7 +170,25 @@ fn calibration(frames: &[FrameAudit]) -> Calibration {
         ],
         covariance: vec![0.124, 0.01, -0.02, 0.01, 0.0441, 0.0, -0.02, 0.0, 0.0676],
         views: frames.iter().filter_map(|f| f.own_view.clone()).collect(),
-        n_pictures: frames.len(),
+        n_pictures: N_FRAMES,
+        distortion: Some(DistortionTest {
+            amplitude: Some(estimate(0.01, 0.006)),
+            k1: estimate(0.002, 0.001),
+            k2: None,
+            corner_shift_px: estimate(0.11, 0.07),
+            table_corner_shift_px: Some(11.4),
+            hypotheses: vec![
+                hypothesis(Lens::None, 0.0964, estimate(OWN_FOCAL_PX, 0.352)),
+                hypothesis(Lens::InverseTable, 0.484, estimate(536.2, 1.7)),
+                hypothesis(Lens::ForwardTable, 0.512, estimate(523.9, 1.8)),
+                hypothesis(Lens::FreeTable, 0.0963, estimate(530.1, 0.36)),
+                hypothesis(Lens::FreeRadial, 0.0962, estimate(530.0, 0.37)),
+            ],
+        }),
+        rejected: vec![RejectedFrame {
+            frame: 9,
+            reason: Rejection::NarrowCorners { n_corners: 7 },
+        }],
         rms_px: 0.0964,
         candidates: vec![
             candidate(Model::Focal, 0.121, 0.128, estimate(530.9, 0.41)),
@@ -171,9 +198,6 @@ fn calibration(frames: &[FrameAudit]) -> Calibration {
         ],
         split_half_focal_px: Some([estimate(529.6, 0.52), estimate(530.4, 0.49)]),
         outliers: vec![Outlier { frame: 3, id: 61, residual_px: 2.31, residual_sigmas: 9.4 }],
-        distortion: None,
-        surface: None,
-        rejected: Vec::new(),
     }
 }
 

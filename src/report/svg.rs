@@ -70,7 +70,7 @@ impl Ticks {
     }
 }
 
-/// The multiple of 1, 2 or 5 times a power of ten that is nearest above `step`.
+/// The least multiple of 1, 2 or 5 times a power of ten that is not below `step`.
 pub(super) fn round_step(step: f64) -> f64 {
     if !(step.is_finite() && step > 0.0) {
         return 1.0;

@@ -62,6 +62,9 @@ impl Line {
     }
 }
 
+/// Running text is broken before it gets wider than this, characters.
+const WIDTH: usize = 88;
+
 /// What a person reads in ten seconds: which camera, how many faults, the numbers in columns, what to do.
 pub fn summary(audit: &Audit) -> Vec<Line> {
     let mut lines = vec![
@@ -81,16 +84,17 @@ pub fn summary(audit: &Audit) -> Vec<Line> {
         .collect();
     for finding in &to_do {
         lines.push(Line::default());
-        lines.push(
-            Line::default()
-                .with(Tone::Strong, finding.code.name())
-                .with(Tone::Plain, "  ")
-                .with(Tone::Plain, &finding.summary),
-        );
-        if !finding.what_to_do.is_empty() {
+        for (index, words) in wrapped(&finding.summary).into_iter().enumerate() {
+            let code = if index == 0 { finding.code.name() } else { "" };
             lines.push(
-                Line::default().with(Tone::Plain, format!("       → {}", finding.what_to_do)),
+                Line::default()
+                    .with(Tone::Strong, format!("{code:5}"))
+                    .with(Tone::Plain, format!("  {words}")),
             );
+        }
+        for (index, words) in wrapped(&finding.what_to_do).into_iter().enumerate() {
+            let arrow = if index == 0 { "→" } else { " " };
+            lines.push(Line::default().with(Tone::Plain, format!("     {arrow} {words}")));
         }
     }
     if let Some(first) = to_do.first() {
@@ -103,6 +107,24 @@ pub fn summary(audit: &Audit) -> Vec<Line> {
         );
     }
     lines
+}
+
+/// The text in lines of at most [`WIDTH`] characters, broken between words, never between a number and its unit.
+fn wrapped(text: &str) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in words::unbroken(text).split(' ').filter(|word| !word.is_empty()) {
+        match lines
+            .last_mut()
+            .filter(|line| line.chars().count() + 1 + word.chars().count() <= WIDTH)
+        {
+            Some(line) => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            None => lines.push(word.to_owned()),
+        }
+    }
+    lines.into_iter().map(|line| line.replace('\u{a0}', " ")).collect()
 }
 
 /// Aligned columns: quantity, factory, measured, difference, code, verdict.

@@ -47,11 +47,8 @@ pub(super) fn rows(audit: &Audit) -> Vec<Row> {
 fn row(audit: &Audit, finding: &Finding) -> Row {
     let dash = || "—".to_owned();
     let factory = audit.factory.as_ref().map(|factory| &factory.intrinsics);
-    let line = audit
-        .own_depth
-        .as_ref()
-        .or(audit.factory_depth.as_ref())
-        .and_then(|depth| depth.line.as_ref());
+    // Without an own camera the line against the board measures the focal length as much as the sensor.
+    let line = audit.own_depth.as_ref().and_then(|depth| depth.line.as_ref());
     let (factory, measured) = match finding.code {
         Code::TD201 => (
             factory.map_or_else(dash, |f| format!("{} px", plain(f.focal_px(), 2))),
@@ -65,7 +62,7 @@ fn row(audit: &Audit, finding: &Finding) -> Row {
             "0 mm".to_owned(),
             line.map_or_else(dash, |line| format!("{} mm", value_and_sigma(in_mm(line.bias_m), 2))),
         ),
-        _ => (String::new(), String::new()),
+        _ => (String::new(), fact(finding)),
     };
     Row {
         quantity: finding.title().to_owned(),
@@ -76,11 +73,20 @@ fn row(audit: &Audit, finding: &Finding) -> Row {
     }
 }
 
-/// The finding's value with its σ and unit, signed.
+/// A value that is no deviation: a number of things, an angle.
+fn fact(finding: &Finding) -> String {
+    match (finding.unit, finding.value) {
+        (Unit::Count, Some(value)) => plain(value, 0),
+        (Unit::Degrees, Some(value)) => format!("{} °", plain(value, 1)),
+        _ => String::new(),
+    }
+}
+
+/// The finding's value with its σ and unit, signed; nothing where the value is no deviation.
 pub(super) fn difference(finding: &Finding) -> String {
     let Some(value) = finding.value.filter(|value| value.is_finite()) else { return String::new() };
-    if finding.unit == Unit::Count {
-        return plain(value, 0);
+    if matches!(finding.unit, Unit::Count | Unit::Degrees) {
+        return String::new();
     }
     let sigma = finding.sigma.unwrap_or(f64::NAN);
     format!("{} {}", signed_with_sigma(Estimate { value, sigma }, 2), unit(finding.unit))
@@ -260,10 +266,26 @@ pub(super) fn signed_with_sigma(estimate: Estimate, max_decimals: usize) -> Stri
     if is_positive { format!("+{text}") } else { text }
 }
 
-/// Numbers kept on one line with their units and their σ, for running text.
+/// A sentence of a finding, which is plain ASCII, with the signs of print: ± and − and σ.
+pub(super) fn typeset(text: &str) -> String {
+    let text = text.replace("+-", "±").replace("sigma", "σ");
+    let mut set = String::with_capacity(text.len());
+    let mut before = ' ';
+    let mut letters = text.chars().peekable();
+    while let Some(letter) = letters.next() {
+        let is_minus = letter == '-'
+            && matches!(before, ' ' | '(')
+            && letters.peek().is_some_and(char::is_ascii_digit);
+        set.push(if is_minus { '−' } else { letter });
+        before = letter;
+    }
+    set
+}
+
+/// As [`typeset`], with numbers kept on one line with their units and their σ, for running text.
 pub(super) fn unbroken(text: &str) -> String {
     const UNITS: [&str; 6] = [" px", " %", " mm", " σ", " ±", " °"];
-    let text = text.replace("± ", "±\u{a0}");
+    let text = typeset(text).replace("± ", "±\u{a0}");
     UNITS.iter().fold(text, |text, unit| text.replace(unit, &unit.replace(' ', "\u{a0}")))
 }
 
@@ -331,6 +353,7 @@ mod tests {
             [0.5, -0.5, 0.001].map(|value| signed_with_sigma(estimate(value), 1)),
             ["+0.5 ± 0.2", "−0.5 ± 0.2", "0.0 ± 0.2"]
         );
+        assert_eq!(typeset("(-6.1 +- 0.1 %) 12-inch -x"), "(−6.1 ± 0.1 %) 12-inch -x");
         assert_eq!(unbroken("6.2 ± 0.1 % of 5 px"), "6.2\u{a0}±\u{a0}0.1\u{a0}% of 5\u{a0}px");
         assert_eq!([count(1, "frame"), count(0, "frame")], ["1 frame", "0 frames"]);
         assert_eq!(

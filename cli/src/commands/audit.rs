@@ -147,9 +147,6 @@ pub(crate) fn observed(
 
 /// The report as a page, with a few of the recording's images.
 pub(crate) fn page(recording: &Recording, audit: &Audit) -> Result<String, Failure> {
-    let photos = report::frames_to_show(audit)
-        .into_iter()
-        .map(|frame| Photo::read(recording, frame))
-        .collect::<Result<Vec<_>, _>>()?;
+    let photos = Photo::read_all(recording, &report::frames_to_show(audit))?;
     Ok(report::page(audit, &photos))
 }

@@ -81,7 +81,7 @@ pub(in crate::report) fn error_histogram(audit: &Audit) -> Option<Figure> {
         title: "Depth error of every corner".to_owned(),
         caption: format!(
             "Right of zero the sensor measures too near. Mean of the frames' medians: {}. Errors beyond {} mm are \
-             left out, as the paper does: there the sensor saw something else than the board. Bins of {BIN_MM} mm.",
+             left out, as the paper does. Bins of {BIN_MM} mm.",
             means.collect::<Vec<_>>().join(", "),
             plain(limit, 0),
         ),

@@ -20,7 +20,7 @@ pub(super) use depth_error::{error_by_frame, error_by_range, error_histogram};
 pub(super) use depth_histogram::depth_histograms;
 pub(super) use finding_gauge::finding_gauge;
 pub(super) use focal::focal_lengths;
-pub(super) use hypotheses::rms_by_model;
+pub(super) use hypotheses::{rms_by_lens, rms_by_model};
 pub(super) use residuals::residual_field;
 pub(super) use view_rms::rms_by_view;
 

@@ -40,8 +40,8 @@ pub(in crate::report) fn residual_field(audit: &Audit) -> Option<Figure> {
     let typical = *lengths.get(lengths.len() * 9 / 10)?;
     let (width, height) = (columns as f64, rows as f64);
     let cell_px = (width.max(height) / CELLS).max(1.0);
-    // Nine of ten arrows stay shorter than a third of a cell; the factor is a round number, so that it can be said.
-    let gain = round_step(0.12 * cell_px / typical.max(1e-6)).min(1e4);
+    // Nine of ten lines stay within half a cell; the factor is a round number, so that it can be said.
+    let gain = round_step(0.25 * cell_px / typical.max(1e-6)).min(1e4);
     let cells = cell_means(&residuals, cell_px);
     let scale = WIDTH / width;
     let drawn_height = height * scale;
@@ -66,7 +66,7 @@ pub(in crate::report) fn residual_field(audit: &Audit) -> Option<Figure> {
                     cell.n, plain(cell.rms, 3)
                 )) {
                     line x1=(n(x)) y1=(n(y)) x2=(n(x + dx)) y2=(n(y + dy)) {}
-                    circle cx=(n(x)) cy=(n(y)) r="3" {}
+                    circle cx=(n(x)) cy=(n(y)) r="2" {}
                 }
             }
         }

@@ -70,7 +70,8 @@ fn evidence(audit: &Audit) -> [(&'static str, Vec<Figure>); 3] {
         .chain(figures::error_histogram(audit))
         .chain(figures::error_by_frame(audit))
         .chain(figures::error_by_range(audit));
-    let camera = [figures::focal_lengths(audit), figures::rms_by_model(audit)];
+    let camera =
+        [figures::focal_lengths(audit), figures::rms_by_lens(audit), figures::rms_by_model(audit)];
     let trust = [figures::residual_field(audit), figures::rms_by_view(audit)];
     [
         ("Is the depth true?", depth.collect()),
@@ -400,6 +401,7 @@ mod tests {
             "depth-frames",
             "depth-range",
             "focal",
+            "lens",
             "models",
             "residuals",
             "views",

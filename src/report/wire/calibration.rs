@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{finite, model_name};
 use crate::{
-    calibrate::{self, Estimate},
+    calibrate::{self, Estimate, Lens},
     camera::{self, Brown, Camera, Intrinsics, RadialTable, TablePair},
     geom::Pixel,
     pose,
@@ -41,6 +41,8 @@ pub struct Calibration {
     pub rms_px: f64,
     /// Views used.
     pub n_views: usize,
+    /// How many different pictures these views are.
+    pub n_pictures: usize,
     /// Corners used.
     pub n_corners: usize,
     /// Focal lengths of two disjoint halves of the views, where there are enough.
@@ -53,6 +55,8 @@ pub struct Calibration {
     pub covariance: Vec<Vec<Option<f64>>>,
     /// All models tried, with what they leave unexplained.
     pub candidates: Vec<Candidate>,
+    /// How much distortion is left in the stream; `null` where it was not tested or the views do not determine it.
+    pub distortion_test: Option<DistortionTest>,
     /// The views used.
     pub views: Vec<View>,
     /// Corners that disagree with all others and were left out.
@@ -80,6 +84,37 @@ pub struct Candidate {
     /// On corners it had not seen.
     pub held_out_rms_px: Option<f64>,
     /// Its focal length.
+    pub focal_px: Option<f64>,
+    /// Standard deviation of `focal_px`.
+    pub focal_sigma_px: Option<f64>,
+}
+
+/// How much of the lens' distortion is left in the stream.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DistortionTest {
+    /// The share of Apple's table that is in the stream: 0 rectified, 1 as the lens drew it, −1 rectified twice;
+    /// `null` without tables.
+    pub amplitude: Option<f64>,
+    /// Standard deviation of `amplitude`.
+    pub amplitude_sigma: Option<f64>,
+    /// How far the lens draws the farthest image corner outside its rectilinear place.
+    pub corner_shift_px: Option<f64>,
+    /// Standard deviation of `corner_shift_px`.
+    pub corner_shift_sigma_px: Option<f64>,
+    /// RMS under each assumption about the stream.
+    pub hypotheses: Vec<Hypothesis>,
+}
+
+/// An assumption about the stream.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Hypothesis {
+    /// `none`, `inverse_table`, `forward_table`, `free_table` or `free_radial`: what rectifies the stream.
+    pub lens: String,
+    /// On the corners it was fitted to.
+    pub rms_px: Option<f64>,
+    /// On pictures it had not seen.
+    pub held_out_rms_px: Option<f64>,
+    /// Focal length under it.
     pub focal_px: Option<f64>,
     /// Standard deviation of `focal_px`.
     pub focal_sigma_px: Option<f64>,
@@ -181,6 +216,7 @@ impl Calibration {
             distortion: Distortion::from(&calibration.camera.distortion),
             rms_px: calibration.rms_px,
             n_views: calibration.views.len(),
+            n_pictures: calibration.n_pictures,
             n_corners: calibration.views.iter().map(|view| view.corners.len()).sum(),
             split_half_focal_px: halves.map(|halves| halves.map(|half| half.value)),
             split_half_focal_sigma_px: halves.map(|halves| halves.map(|half| finite(half.sigma))),
@@ -191,6 +227,7 @@ impl Calibration {
                 .map(|row| row.iter().map(|&value| finite(value)).collect())
                 .collect(),
             candidates: calibration.candidates.iter().map(Candidate::from).collect(),
+            distortion_test: calibration.distortion.as_ref().map(DistortionTest::from),
             views: calibration.views.iter().map(View::from).collect(),
             outliers: calibration.outliers.iter().map(Outlier::from).collect(),
         }
@@ -237,6 +274,37 @@ impl From<&calibrate::Candidate> for Candidate {
             held_out_rms_px: finite(candidate.held_out_rms_px),
             focal_px: finite(candidate.focal_px.value),
             focal_sigma_px: finite(candidate.focal_px.sigma),
+        }
+    }
+}
+
+impl From<&calibrate::DistortionTest> for DistortionTest {
+    fn from(test: &calibrate::DistortionTest) -> Self {
+        Self {
+            amplitude: test.amplitude.and_then(|amplitude| finite(amplitude.value)),
+            amplitude_sigma: test.amplitude.and_then(|amplitude| finite(amplitude.sigma)),
+            corner_shift_px: finite(test.corner_shift_px.value),
+            corner_shift_sigma_px: finite(test.corner_shift_px.sigma),
+            hypotheses: test.hypotheses.iter().map(Hypothesis::from).collect(),
+        }
+    }
+}
+
+impl From<&calibrate::Hypothesis> for Hypothesis {
+    fn from(hypothesis: &calibrate::Hypothesis) -> Self {
+        let lens = match hypothesis.lens {
+            Lens::None => "none",
+            Lens::InverseTable => "inverse_table",
+            Lens::ForwardTable => "forward_table",
+            Lens::FreeTable => "free_table",
+            Lens::FreeRadial => "free_radial",
+        };
+        Self {
+            lens: lens.to_owned(),
+            rms_px: finite(hypothesis.rms_px),
+            held_out_rms_px: finite(hypothesis.held_out_rms_px),
+            focal_px: finite(hypothesis.focal_px.value),
+            focal_sigma_px: finite(hypothesis.focal_px.sigma),
         }
     }
 }

@@ -22,7 +22,9 @@ pub use audit::{
     Alignment, Audit, Board, CorrectionInfo, Depth, DeviceInfo, EvidenceInfo, FactoryInfo,
     FindingInfo, Frame, FrameDepthInfo,
 };
-pub use calibration::{Calibration, Candidate, Distortion, Outlier, Parameter, Table, View};
+pub use calibration::{
+    Calibration, Candidate, Distortion, DistortionTest, Hypothesis, Outlier, Parameter, Table, View,
+};
 pub use detect::{Detect, DetectedCorner, DetectedImage, RejectedCorner};
 
 use serde::{Deserialize, Serialize};
