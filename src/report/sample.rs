@@ -156,6 +156,7 @@ fn calibration(frames: &[FrameAudit]) -> Calibration {
     let hypothesis = |lens, rms_px, focal_px| Hypothesis {
         lens,
         rms_px,
+        flat_rms_px: rms_px,
         held_out_rms_px: 1.07 * rms_px,
         focal_px,
     };
@@ -171,6 +172,7 @@ fn calibration(frames: &[FrameAudit]) -> Calibration {
         covariance: vec![0.124, 0.01, -0.02, 0.01, 0.0441, 0.0, -0.02, 0.0, 0.0676],
         views: frames.iter().filter_map(|f| f.own_view.clone()).collect(),
         n_pictures: N_FRAMES,
+        surface: None,
         distortion: Some(DistortionTest {
             amplitude: Some(estimate(0.01, 0.006)),
             k1: estimate(0.002, 0.001),
