@@ -424,52 +424,43 @@ impl Expected {
         let mut memo: Vec<Option<Box<[f64; TAPS]>>> =
             vec![None; TURNS.len() * cells.len() * self.n_used];
         let most = candidates.iter().map(|c| c.place.n_markers).max().unwrap_or(0);
-        let mut n_samples = 0.0;
         for candidate in &mut candidates {
             // Residuals are comparable only over the same cells.
             if candidate.place.n_markers < most {
                 candidate.score = f64::NEG_INFINITY;
                 continue;
             }
-            let mut normal = nalgebra::SMatrix::<f64, TAPS, TAPS>::zeros();
-            let mut right = nalgebra::SVector::<f64, TAPS>::zeros();
-            let mut energy = 0.0;
-            n_samples = 0.0;
+            let mut fit = BlurFit::default();
             for (c, cell) in cells.iter().enumerate() {
                 let Some(Some(id)) = self.marker(&candidate.place, cell) else { continue };
                 let samples = &values[candidate.turn][c * n2..][..n2];
-                normal += &blur.normals[id];
                 let key = (candidate.turn * cells.len() + c) * self.n_used + id;
                 let part = memo[key].get_or_insert_with(|| Box::new(blur.correlate(id, samples)));
-                for (r, p) in right.iter_mut().zip(part.iter()) {
-                    *r += p;
-                }
-                energy += samples.iter().map(|v| f64::from(v * v)).sum::<f64>();
-                n_samples += n2 as f64;
+                fit.add(&blur.normals[id], part, samples);
             }
-            for t in 0..TAPS {
-                normal[(t, t)] += 1e-3 * n_samples;
-            }
-            let Some(cholesky) = normal.cholesky() else { continue };
-            let kernel = cholesky.solve(&right);
-            let residual = (energy - kernel.dot(&right)).max(1e-6 * energy);
-            candidate.score = -(residual / n_samples).ln();
+            candidate.score = fit.score();
         }
         let (best, second) = best_two(&candidates).ok_or(NotIdentified::Ambiguous)?;
-        let votes = n_samples / (2.0 * SAMPLES_PER_VOTE);
-        let margin = votes * (best.score - second);
-        // Against chance: all other placements are samples of it.
-        let others: Vec<f64> = candidates
-            .iter()
-            .map(|c| c.score)
-            .filter(|s| s.is_finite() && *s < best.score)
-            .collect();
-        let mean = others.iter().sum::<f64>() / others.len().max(1) as f64;
-        let spread = (others.iter().map(|s| (s - mean).powi(2)).sum::<f64>()
-            / others.len().max(1) as f64)
-            .sqrt();
-        let significance =
-            if others.len() < 8 { 0.0 } else { (best.score - mean) / spread.max(1e-9) };
+        // What all markers have in common explains much of any of them. The best must beat that, too.
+        let common = {
+            let id = self.n_used;
+            let mut fit = BlurFit::default();
+            for (c, cell) in cells.iter().enumerate() {
+                if let Some(Some(_)) = self.marker(&best.place, cell) {
+                    let samples = &values[best.turn][c * n2..][..n2];
+                    fit.add(&blur.normals[id], &blur.correlate(id, samples), samples);
+                }
+            }
+            fit.score()
+        };
+        let lead = best.score - second.max(common);
+        let votes = (best.place.n_markers * n2) as f64 / (2.0 * SAMPLES_PER_VOTE);
+        let margin = votes * lead;
+        if lead < MIN_BLUR_LEAD {
+            return Err(NotIdentified::Ambiguous);
+        }
+        // The margin over what is common plays the part of the significance.
+        let significance = (2.0 * votes * (best.score - common)).max(0.0).sqrt();
         accept(Placement { margin, significance, ..best.place })
     }
 }
@@ -508,7 +499,57 @@ const TAPS: usize = 50;
 /// Blurred samples are far from independent: this many count as one.
 const SAMPLES_PER_VOTE: f64 = 4.0;
 
-/// The expected markers, shifted by every tap of the kernel.
+/// Least ln(RSS of the runner-up / RSS of the best): chance and model errors stay below 0.05, blurred boards that a
+/// person can read lie above 0.2.
+const MIN_BLUR_LEAD: f64 = 0.12;
+
+/// The kernel that explains all samples added.
+struct BlurFit {
+    normal: nalgebra::SMatrix<f64, TAPS, TAPS>,
+    right: nalgebra::SVector<f64, TAPS>,
+    energy: f64,
+    n_samples: f64,
+}
+
+impl Default for BlurFit {
+    fn default() -> Self {
+        Self {
+            normal: nalgebra::SMatrix::zeros(),
+            right: nalgebra::SVector::zeros(),
+            energy: 0.0,
+            n_samples: 0.0,
+        }
+    }
+}
+
+impl BlurFit {
+    fn add(
+        &mut self,
+        normal: &nalgebra::SMatrix<f64, TAPS, TAPS>,
+        right: &[f64; TAPS],
+        samples: &[f32],
+    ) {
+        self.normal += normal;
+        for (sum, part) in self.right.iter_mut().zip(right) {
+            *sum += part;
+        }
+        self.energy += samples.iter().map(|v| f64::from(v * v)).sum::<f64>();
+        self.n_samples += samples.len() as f64;
+    }
+
+    /// −ln of the mean squared residual.
+    fn score(mut self) -> f64 {
+        for t in 0..TAPS {
+            self.normal[(t, t)] += 1e-3 * self.n_samples;
+        }
+        let Some(cholesky) = self.normal.cholesky() else { return f64::NEG_INFINITY };
+        let kernel = cholesky.solve(&self.right);
+        let residual = (self.energy - kernel.dot(&self.right)).max(1e-6 * self.energy);
+        -(residual / self.n_samples).ln()
+    }
+}
+
+/// The expected markers, and last the mean of all, shifted by every tap of the kernel.
 #[derive(Clone, Debug)]
 struct BlurModel {
     /// For each marker, sample and tap: the expected value.
@@ -548,6 +589,22 @@ impl BlurModel {
             }
             normals.push(normal);
         }
+        // The mean marker.
+        let mut normal = nalgebra::SMatrix::<f64, TAPS, TAPS>::zeros();
+        for sample in 0..n2 {
+            let mut mean = [0.0_f32; TAPS];
+            for id in 0..expected.n_used {
+                let row = &shifted[(id * n2 + sample) * TAPS..][..TAPS];
+                for (m, t) in mean.iter_mut().zip(row) {
+                    *m += t / expected.n_used as f32;
+                }
+            }
+            let v =
+                nalgebra::SVector::<f64, TAPS>::from_iterator(mean.iter().map(|&t| f64::from(t)));
+            normal.ger(1.0, &v, &v, 1.0);
+            shifted.extend(mean);
+        }
+        normals.push(normal);
         Self { shifted, normals, n2 }
     }
 
