@@ -100,7 +100,9 @@ fn iphone_has_no_focal_fault() {
         let Some(audit) = run(IPHONE, method) else { return };
         assert_eq!(faults(&audit), [Code::TD203], "{}", audit.method.name());
         let focal = finding(&audit, Code::TD201);
-        assert_eq!(focal.verdict, Verdict::Ok, "{focal:?}");
+        // Half a percent off is significant with the board's shape estimated, and far from relevant.
+        assert!(matches!(focal.verdict, Verdict::Ok | Verdict::Info), "{focal:?}");
+        assert!(focal.value.expect("value").abs() < 0.8, "{focal:?}");
         assert_eq!(audit.device.sensor, Sensor::TrueDepth);
     }
 }
