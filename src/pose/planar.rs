@@ -4,8 +4,12 @@ use nalgebra::{Matrix2, Matrix3, Matrix3x2, SMatrix, SVector, Vector2, Vector3};
 
 use crate::geom::{Board, Color, Homography, Pixel, Point, Pose, Rotation};
 
-/// Both poses of a plane (z = 0) that explain how its points project to these directions (x/z, y/z), the better first;
-/// `None` for fewer than four points or points of which three or more quarters lie on a line.
+/// A second pose whose sum of squares is that many times the first's is not refined: both are within a few percent of
+/// their minimum.
+const AMBIGUOUS: f64 = 16.0;
+
+/// The poses of a plane (z = 0) that may explain how its points project to these directions (x/z, y/z), the better
+/// first: two, or one where the other is out of the question; `None` for fewer than four points or points of which three or more quarters lie on a line.
 ///
 /// A plane far away or small looks nearly the same tilted forth and back; noise decides which of both fits better, so
 /// that a caller must refine both. The method is IPPE (Collins and Bartoli, *Infinitesimal plane-based pose
@@ -19,7 +23,7 @@ use crate::geom::{Board, Color, Homography, Pixel, Point, Pose, Rotation};
 pub(super) fn both_poses(
     points: &[Point<Board>],
     rays: &[[f64; 2]],
-) -> Option<[Pose<Color, Board>; 2]> {
+) -> Option<Vec<Pose<Color, Board>>> {
     let n = points.len() as f64;
     let (cx, cy) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.x() / n, y + p.y() / n));
     let from: Vec<Pixel> = points.iter().map(|p| Pixel::new(p.x() - cx, p.y() - cy)).collect();
@@ -68,8 +72,10 @@ pub(super) fn both_poses(
         error(a).total_cmp(&error(b))
     });
     match found {
-        [Some((_, first)), Some((_, second))] => Some([first, second]),
-        [Some((_, first)), None] => Some([first, first]),
+        [Some((least, first)), Some((error, second))] if error < AMBIGUOUS * least => {
+            Some(vec![first, second])
+        }
+        [Some((_, first)), _] => Some(vec![first]),
         _ => None,
     }
 }
