@@ -1,5 +1,7 @@
 //! The whole way from an image to an observation.
 
+use std::sync::{Mutex, PoisonError};
+
 use crate::{board::CharucoBoard, geom::Pixel, image::Gray};
 
 use super::{
@@ -8,17 +10,35 @@ use super::{
     lattice::{Lattice, lattices},
     map::SmoothMap,
     pyramid::Level,
-    refine::{Guess, Scales, refine},
+    refine::{Guess, Scales, Window, refine},
     saddle::saddles,
 };
 
 /// Finds a board in images.
 ///
-/// A detector holds no state between images and can be shared between threads.
-#[derive(Clone, Debug)]
+/// What is found depends on the image alone: a detector keeps nothing between images but memory, and one can be shared
+/// between threads.
+#[derive(Debug)]
 pub struct Detector {
     board: CharucoBoard,
     expected: Expected,
+    /// Memory for as many images as were looked at at one time. Fresh memory for every image would cost more than
+    /// smoothing it.
+    pool: Mutex<Vec<Memory>>,
+}
+
+impl Clone for Detector {
+    fn clone(&self) -> Self {
+        Self::new(&self.board)
+    }
+}
+
+/// What one image needs, kept for the next.
+#[derive(Debug, Default)]
+struct Memory {
+    level: Level,
+    response: Vec<f32>,
+    window: Window,
 }
 
 /// Saddles kept at most, for every million pixels of a level and at least: boards have at most a few hundred corners,
@@ -37,9 +57,10 @@ const MOST_PASSES: usize = 4;
 const MAX_SIGMA_PX: f64 = 0.7;
 
 impl Detector {
-    /// A detector for this board. Its layout is found from the image; the one the board states only breaks ties.
+    /// A detector for this board. Its layout is found from the image, whatever the board says; where both are the same
+    /// (an odd number of rows), the board's own is reported, or else the new one.
     pub fn new(board: &CharucoBoard) -> Self {
-        Self { board: board.clone(), expected: Expected::new(board) }
+        Self { board: board.clone(), expected: Expected::new(board), pool: Mutex::new(Vec::new()) }
     }
 
     /// The board that is sought.
@@ -49,25 +70,26 @@ impl Detector {
 
     /// The board's corners in `image`. May miss, does not invent.
     pub fn detect(&self, image: &Gray) -> Observation {
+        // A poisoned lock only means that another thread panicked; the memory has no state to be wrong.
+        let mut memory =
+            self.pool.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default();
+        let observation = self.detect_in(image, &mut memory);
+        self.pool.lock().unwrap_or_else(PoisonError::into_inner).push(memory);
+        observation
+    }
+
+    fn detect_in(&self, image: &Gray, memory: &mut Memory) -> Observation {
         let mut rejects = Vec::new();
-        let mut scales = Scales::new(image);
-        let mut best: Option<Found> = None;
+        let Memory { level, response, window } = memory;
+        let mut scales = Scales::new(image, window);
         for factor in factors(image) {
-            let Some(level) = Level::new(image, factor) else { continue };
-            let found = self.search(&mut scales, &level, &mut rejects);
-            if let Some(found) = found
-                && best.as_ref().is_none_or(|b| found.lattice.nodes.len() > b.lattice.nodes.len())
+            if level.fill(image, factor).is_some()
+                && let Some(found) = self.search(&mut scales, level, response, &mut rejects)
             {
-                best = Some(found);
-            }
-            if best.is_some() {
-                break;
+                return self.collect(&mut scales, &found, rejects);
             }
         }
-        match best {
-            Some(found) => self.collect(&mut scales, &found, rejects),
-            None => Observation { corners: Vec::new(), identity: None, rejects },
-        }
+        Observation { corners: Vec::new(), identity: None, rejects }
     }
 
     /// Identifies the best lattice of one level.
@@ -75,11 +97,12 @@ impl Detector {
         &self,
         scales: &mut Scales<'_>,
         level: &Level,
+        response: &mut Vec<f32>,
         rejects: &mut Vec<Reject>,
     ) -> Option<Found> {
         let mpx = (level.width * level.height) as f64 * 1e-6;
         let most = ((MOST_SADDLES_PER_MPX * mpx) as usize).max(LEAST_MOST_SADDLES);
-        let saddles = saddles(level, most);
+        let saddles = saddles(level, most, response);
         let mut identified: Option<Found> = None;
         for mut lattice in lattices(level, &saddles, MIN_NODES).into_iter().take(MOST_LATTICES) {
             if identified.is_some() {

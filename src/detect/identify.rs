@@ -251,11 +251,11 @@ struct Candidate {
 
 impl Expected {
     pub(super) fn new(board: &CharucoBoard) -> Self {
-        // With an odd number of rows the layouts are the same.
-        let layouts: &[Layout] = if board.squares_y.is_multiple_of(2) {
-            &[Layout::New, Layout::Legacy]
-        } else {
-            &[Layout::New]
+        // With an odd number of rows the layouts are the same, and which is reported is the board's choice.
+        let layouts: &[Layout] = match board.layout {
+            _ if board.squares_y.is_multiple_of(2) => &[Layout::New, Layout::Legacy],
+            Some(Layout::Legacy) => &[Layout::Legacy],
+            _ => &[Layout::New],
         };
         let size = board.dictionary.bits() + 2;
         let mut n_used = 0;

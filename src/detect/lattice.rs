@@ -145,9 +145,9 @@ fn links(level: &Level, saddles: &[Saddle]) -> Vec<[Link; 4]> {
     let mut one_way: Vec<[Link; 4]> = vec![[None; 4]; saddles.len()];
     let mut near: Vec<(f32, u32)> = Vec::new();
     for (p, links) in one_way.iter_mut().enumerate() {
-        // Rings of buckets outward until every edge has its neighbour; squares are seldom far larger than the
-        // distance to the nearest saddle, but markers lie between, hence the generous reach.
-        for reach in [1, 2, 4, 8] {
+        // Rings of buckets outward until every edge has its neighbour, to 64 pixels at least: larger squares are found
+        // on a coarser level.
+        for reach in [1, 2, 4] {
             near.clear();
             grid.near(saddles, p, reach, &mut near);
             near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));

@@ -6,7 +6,7 @@ use crate::{geom::Pixel, image::Gray};
 ///
 /// A block average with a binomial is what keeps one pass over memory: the printed bits of the markers, the noise and
 /// the JPEG blocks vanish, a crossing of two edges stays a saddle of the same centre.
-#[derive(Clone, Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Level {
     pub(super) width: usize,
     pub(super) height: usize,
@@ -14,40 +14,41 @@ pub(super) struct Level {
     pub(super) factor: usize,
     /// Grey values 0..=255, smoothed.
     pub(super) gray: Vec<f32>,
+    /// Memory of the block sums.
+    blocks: Vec<f32>,
+    /// Memory of one row.
+    column: Vec<f32>,
 }
 
 impl Level {
-    /// The level whose pixels are `factor` × `factor` blocks of `image`; rows and columns that fill no block are left
-    /// out. `None` where fewer than 16 pixels would remain along an axis.
-    pub(super) fn new(image: &Gray, factor: usize) -> Option<Self> {
+    /// Makes this the level whose pixels are `factor` × `factor` blocks of `image`; rows and columns that fill no
+    /// block are left out. `None` where fewer than 16 pixels would remain along an axis.
+    pub(super) fn fill(&mut self, image: &Gray, factor: usize) -> Option<()> {
         let (width, height) = (image.width() / factor, image.height() / factor);
         if width < 16 || height < 16 {
             return None;
         }
-        let blocks = block_sums(image, factor, width, height);
+        (self.width, self.height, self.factor) = (width, height, factor);
+        block_sums(image, factor, width, height, &mut self.blocks);
         let scale = 1.0 / (256.0 * (factor * factor) as f32);
-        let mut gray = vec![0.0_f32; width * height];
-        let mut column = vec![0.0_f32; width + 4];
+        self.gray.resize(width * height, 0.0);
+        self.column.resize(width + 4, 0.0);
+        let column = &mut self.column[..width + 4];
         for y in 0..height {
             // Beyond the border the outermost row repeats.
             let row = |dy: isize| {
                 let y = (y as isize + dy).clamp(0, height as isize - 1) as usize;
-                &blocks[y * width..][..width]
+                &self.blocks[y * width..][..width]
             };
-            let rows = [row(-2), row(-1), row(0), row(1), row(2)];
-            binomial(&mut column[2..2 + width], rows);
+            binomial(&mut column[2..2 + width], [row(-2), row(-1), row(0), row(1), row(2)], scale);
             column[0] = column[2];
             column[1] = column[2];
             column[width + 2] = column[width + 1];
             column[width + 3] = column[width + 1];
-            let out = &mut gray[y * width..][..width];
-            let shifted = [0, 1, 2, 3, 4].map(|dx| &column[dx..dx + width]);
-            binomial(out, shifted);
-            for value in out {
-                *value *= scale;
-            }
+            let out = &mut self.gray[y * width..][..width];
+            binomial(out, [0, 1, 2, 3, 4].map(|dx| &column[dx..dx + width]), 1.0);
         }
-        Some(Self { width, height, factor, gray })
+        Some(())
     }
 
     /// Where a position of this level lies in the image.
@@ -65,18 +66,18 @@ impl Level {
     }
 }
 
-/// 1 4 6 4 1 across five slices of equal length.
-fn binomial(out: &mut [f32], [a, b, c, d, e]: [&[f32]; 5]) {
+/// 1 4 6 4 1 across five slices of equal length, times `scale`.
+fn binomial(out: &mut [f32], [a, b, c, d, e]: [&[f32]; 5], scale: f32) {
     let n = out.len();
     let (a, b, c, d, e) = (&a[..n], &b[..n], &c[..n], &d[..n], &e[..n]);
     for i in 0..n {
-        out[i] = (a[i] + e[i]) + 4.0 * (b[i] + d[i]) + 6.0 * c[i];
+        out[i] = ((a[i] + e[i]) + 4.0 * (b[i] + d[i]) + 6.0 * c[i]) * scale;
     }
 }
 
 /// The sum over each block.
-fn block_sums(image: &Gray, factor: usize, width: usize, height: usize) -> Vec<f32> {
-    let mut sums = vec![0.0_f32; width * height];
+fn block_sums(image: &Gray, factor: usize, width: usize, height: usize, sums: &mut Vec<f32>) {
+    sums.resize(width * height, 0.0);
     // u16 holds 256 rows of one column, and far more than any factor used.
     let mut columns = vec![0_u16; width * factor];
     for (y, out) in sums.chunks_exact_mut(width).enumerate() {
@@ -109,7 +110,6 @@ fn block_sums(image: &Gray, factor: usize, width: usize, height: usize) -> Vec<f
             }
         }
     }
-    sums
 }
 
 #[cfg(test)]
@@ -122,7 +122,8 @@ mod tests {
         let pixels = (0..width * height).map(|i| (2 * (i % width) + i / width) as u8).collect();
         let image = Gray::new(width, height, pixels);
         for factor in [1, 2, 3] {
-            let level = Level::new(&image, factor).unwrap();
+            let mut level = Level::default();
+            level.fill(&image, factor).unwrap();
             for y in 3..level.height - 3 {
                 for x in 3..level.width - 3 {
                     let p = level.to_image(x as f32, y as f32);
@@ -134,6 +135,6 @@ mod tests {
                 }
             }
         }
-        assert!(Level::new(&image, 4).is_none(), "12 rows are too few");
+        assert!(Level::default().fill(&image, 4).is_none(), "12 rows are too few");
     }
 }

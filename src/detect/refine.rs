@@ -38,18 +38,12 @@ pub(super) struct Scales<'a> {
     /// Standard deviation of the image's noise, grey levels.
     noise: f64,
     coarse: [Option<Gray>; MAX_FACTOR - 1],
-    /// Memory of the last window, for the next.
-    window: Window,
+    window: &'a mut Window,
 }
 
 impl<'a> Scales<'a> {
-    pub(super) fn new(image: &'a Gray) -> Self {
-        Self {
-            image,
-            noise: noise_sigma(image),
-            coarse: [const { None }; MAX_FACTOR - 1],
-            window: Window::default(),
-        }
+    pub(super) fn new(image: &'a Gray, window: &'a mut Window) -> Self {
+        Self { image, noise: noise_sigma(image), coarse: [const { None }; MAX_FACTOR - 1], window }
     }
 
     /// The image itself.
@@ -60,16 +54,17 @@ impl<'a> Scales<'a> {
     /// The image in blocks of `factor` × `factor` pixels, smoothed, its noise, and memory for a window of it.
     fn at(&mut self, factor: usize) -> Option<(&Gray, f64, &mut Window)> {
         if factor == 1 {
-            return Some((self.image, self.noise, &mut self.window));
+            return Some((self.image, self.noise, self.window));
         }
         let slot = &mut self.coarse[factor - 2];
         if slot.is_none() {
-            let level = Level::new(self.image, factor)?;
+            let mut level = Level::default();
+            level.fill(self.image, factor)?;
             let pixels = level.gray.iter().map(|v| (v + 0.5) as u8).collect();
             *slot = Some(Gray::new(level.width, level.height, pixels));
         }
         // Averaging divides white noise; what smoothing leaves of it is 0.27 of a pixel's (Σw² = 70/256 per axis).
-        Some((slot.as_ref()?, (0.27 * self.noise / factor as f64).max(ROUNDING), &mut self.window))
+        Some((slot.as_ref()?, (0.27 * self.noise / factor as f64).max(ROUNDING), self.window))
     }
 }
 
@@ -269,7 +264,7 @@ const LANES: usize = 8;
 /// axes: without it, sharp edges are undersampled and their squared gradients pull the corner towards pixel centres
 /// (0.07 px at a blur of σ = 0.6 px).
 #[derive(Debug, Default)]
-struct Window {
+pub(super) struct Window {
     /// Position of the first gradient.
     x0: f64,
     y0: f64,
@@ -282,6 +277,8 @@ struct Window {
     work: Vec<f32>,
     column: Vec<u16>,
     lines: [Vec<f32>; 2],
+    /// Σ w gx², Σ w gx gy, Σ w gy² of the last step.
+    moments: [f64; 3],
 }
 
 impl Window {
@@ -340,7 +337,7 @@ impl Window {
     }
 
     /// One step: the corner that the weighted gradients about `q` point at.
-    fn solve(&self, cross: &Cross, q: [f64; 2]) -> Option<[f64; 2]> {
+    fn solve(&mut self, cross: &Cross, q: [f64; 2]) -> Option<[f64; 2]> {
         let mut sums = [[0.0_f32; LANES]; 5];
         let first_dx = (self.x0 - q[0]) as f32;
         for y in 0..self.rows {
@@ -364,6 +361,7 @@ impl Window {
             }
         }
         let [a, b, c, rx, ry] = sums.map(|lanes| lanes.iter().map(|&v| f64::from(v)).sum::<f64>());
+        self.moments = [a, b, c];
         let det = a * c - b * b;
         // Two edges of different directions: the smaller eigenvalue is a fair part of the larger.
         if !(det > 0.02 * (a + c) * (a + c) / 4.0) {
@@ -377,80 +375,77 @@ impl Window {
     /// The derivative of Σ w g (gᵀr) by one gradient is w·((gᵀr)·1 + g·rᵀ). A gradient is a difference of smoothed
     /// pixels, so its influence spreads over 4 × 4 raw pixels by (−1 −1 1 1)/4 along and (1 3 3 1)/8 across it.
     fn sigma(&mut self, cross: &Cross, q: [f64; 2]) -> Option<f64> {
-        let (mut a, mut b, mut c) = (0.0_f32, 0.0_f32, 0.0_f32);
+        let [a, b, c] = self.moments;
+        let det = a * c - b * b;
+        if !(det > 0.0) {
+            return None;
+        }
         // Rows and columns of zeros round the influences take what spreads.
         let n = self.stride + LANES + 3;
         let size = n * (self.rows + 6);
         self.work.clear();
         self.work.resize(4 * size, 0.0);
-        let (xx, rest) = self.work.split_at_mut(size);
-        let (yx, rest) = rest.split_at_mut(size);
-        let (xy, yy) = rest.split_at_mut(size);
+        let (x_of_gx, rest) = self.work.split_at_mut(size);
+        let (x_of_gy, rest) = rest.split_at_mut(size);
+        let (y_of_gx, y_of_gy) = rest.split_at_mut(size);
+        let [ia, ib, ic] = [a, b, c].map(|m| (m / det) as f32); // M⁻¹ = [ic −ib; −ib ia]
+        let first_dx = (self.x0 - q[0]) as f32;
         for y in 0..self.rows {
             let dy = (self.y0 + y as f64 - q[1]) as f32;
             let gx = &self.gx[y * self.stride..][..self.stride];
             let gy = &self.gy[y * self.stride..][..self.stride];
-            let row = (y + 3) * n + 3..(y + 3) * n + 3 + self.stride;
-            let (xx, yx, xy, yy) =
-                (&mut xx[row.clone()], &mut yx[row.clone()], &mut xy[row.clone()], &mut yy[row]);
-            for x in 0..self.stride {
-                let dx = (self.x0 - q[0]) as f32 + x as f32;
+            let at = (y + 3) * n + 3;
+            let n = self.stride;
+            let (x_of_gx, x_of_gy) = (&mut x_of_gx[at..][..n], &mut x_of_gy[at..][..n]);
+            let (y_of_gx, y_of_gy) = (&mut y_of_gx[at..][..n], &mut y_of_gy[at..][..n]);
+            for x in 0..n {
+                let dx = first_dx + x as f32;
                 let w = cross.weight(dx, dy);
                 let (gx, gy) = (gx[x], gy[x]);
-                a += w * gx * gx;
-                b += w * gx * gy;
-                c += w * gy * gy;
                 let along = gx * dx + gy * dy;
-                xx[x] = w * (along + gx * dx); // Of gx on the first sum,
-                yx[x] = w * (gy * dx); //          on the second;
-                xy[x] = w * (gx * dy); //          of gy on the first,
-                yy[x] = w * (along + gy * dy); //  on the second.
+                // The derivatives of both sums by gx, then by gy.
+                let (first, second) = (w * (along + gx * dx), w * (gy * dx));
+                x_of_gx[x] = ic * first - ib * second;
+                y_of_gx[x] = ia * second - ib * first;
+                let (first, second) = (w * (gx * dy), w * (along + gy * dy));
+                x_of_gy[x] = ic * first - ib * second;
+                y_of_gy[x] = ia * second - ib * first;
             }
         }
-        let det = a * c - b * b;
-        if !(det > 0.0) {
-            return None;
-        }
-        // δq = M⁻¹ · (influences): the planes for x, then those for y.
-        let (ia, ib, ic) = (a / det, b / det, c / det);
-        let mut variance = 0.0;
-        for [p, r] in [[ic, -ib], [-ib, ia]] {
-            variance += spread(n, self.rows + 3, &[xx, yx, xy, yy], [p, r], &mut self.lines);
-        }
+        let variance = spread(n, self.rows + 3, x_of_gx, x_of_gy, &mut self.lines)
+            + spread(n, self.rows + 3, y_of_gx, y_of_gy, &mut self.lines);
         Some((0.5 * variance).sqrt())
     }
 }
 
-/// Σ of the squared influences of all raw pixels, for the combination p·first + r·second of the influences of the
-/// gradients on the first and second sum.
-fn spread(
-    n: usize,
-    rows: usize,
-    planes: &[&mut [f32]; 4],
-    [p, r]: [f32; 2],
-    lines: &mut [Vec<f32>; 2],
-) -> f64 {
-    let [of_gx, of_gy] = lines;
-    of_gx.resize(n, 0.0);
-    of_gy.resize(n, 0.0);
+/// Σ of the squared influences of all raw pixels, from those of the gradients: rows of `n`, with a rim of zeros.
+fn spread(n: usize, rows: usize, of_gx: &[f32], of_gy: &[f32], lines: &mut [Vec<f32>; 2]) -> f64 {
+    let [line_gx, line_gy] = lines;
+    line_gx.resize(n, 0.0);
+    line_gy.resize(n, 0.0);
     let mut sum = 0.0;
     for y in 0..rows {
-        let row = |plane: usize, k: usize| &planes[plane][(y + k) * n..][..n];
-        let gx = [0, 1, 2, 3].map(|k| (row(0, k), row(1, k)));
-        let gy = [0, 1, 2, 3].map(|k| (row(2, k), row(3, k)));
-        for x in 0..n {
-            let v = |(first, second): (&[f32], &[f32])| p * first[x] + r * second[x];
-            of_gx[x] = (v(gx[0]) + v(gx[3]) + 3.0 * (v(gx[1]) + v(gx[2]))) / 8.0;
-            of_gy[x] = (v(gy[2]) + v(gy[3]) - v(gy[0]) - v(gy[1])) / 4.0;
+        let row = |k: usize| (y + k) * n..(y + k + 1) * n;
+        let [a, b, c, d] = [0, 1, 2, 3].map(|k| &of_gx[row(k)]);
+        for ((((out, a), b), c), d) in line_gx.iter_mut().zip(a).zip(b).zip(c).zip(d) {
+            *out = (a + d + 3.0 * (b + c)) * 0.125;
+        }
+        let [a, b, c, d] = [0, 1, 2, 3].map(|k| &of_gy[row(k)]);
+        for ((((out, a), b), c), d) in line_gy.iter_mut().zip(a).zip(b).zip(c).zip(d) {
+            *out = (c + d - a - b) * 0.25;
         }
         let mut lanes = [0.0_f32; LANES];
-        for (gx, gy) in of_gx.windows(LANES + 3).zip(of_gy.windows(LANES + 3)).step_by(LANES) {
+        let mut x = 0;
+        while x + LANES + 3 <= n {
+            let gx: &[f32] = &line_gx[x..x + LANES + 3];
+            let gy: &[f32] = &line_gy[x..x + LANES + 3];
             for k in 0..LANES {
-                let from_gx = (gx[k + 2] + gx[k + 3] - gx[k] - gx[k + 1]) / 4.0;
-                let from_gy = (gy[k] + gy[k + 3] + 3.0 * (gy[k + 1] + gy[k + 2])) / 8.0;
+                let from_gx = (gx[k + 2] + gx[k + 3] - gx[k] - gx[k + 1]) * 0.25;
+                let from_gy = (gy[k] + gy[k + 3] + 3.0 * (gy[k + 1] + gy[k + 2])) * 0.125;
                 let influence = from_gx + from_gy;
                 lanes[k] += influence * influence;
             }
+            x += LANES;
         }
         sum += lanes.iter().map(|&v| f64::from(v)).sum::<f64>();
     }

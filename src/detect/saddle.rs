@@ -63,14 +63,20 @@ const MIN_STRENGTH: f32 = 1.0;
 /// Difference between bright and dark on the ring, grey levels.
 const MIN_CONTRAST: f32 = 8.0;
 
-/// The saddles of a level, strongest first, at most `most`.
-pub(super) fn saddles(level: &Level, most: usize) -> Vec<Saddle> {
+/// Saddles much weaker than the strongest are texture: the strength goes with the square of the contrast, so a corner
+/// in deep shade (a tenth of the light) stays above.
+const MIN_RELATIVE_STRENGTH: f32 = 0.005;
+/// The strongest saddle that counts for this is the one of this rank: a few reflections must not set the scale.
+const REFERENCE_RANK: usize = 24;
+
+/// The saddles of a level, strongest first, at most `most`. `response` is memory only.
+pub(super) fn saddles(level: &Level, most: usize, response: &mut Vec<f32>) -> Vec<Saddle> {
     let (width, height) = (level.width, level.height);
     let margin = RING_RADIUS as usize;
     if width < 2 * margin + 3 || height < 2 * margin + 3 {
         return Vec::new();
     }
-    let response = response(level);
+    fill_response(level, response);
     let mut peaks: Vec<(f32, u32)> = Vec::new();
     for y in margin..height - margin {
         let [above, here, below] = [y - 1, y, y + 1].map(|y| &response[y * width..][..width]);
@@ -87,6 +93,12 @@ pub(super) fn saddles(level: &Level, most: usize) -> Vec<Saddle> {
             }
         }
     }
+    if peaks.len() > REFERENCE_RANK {
+        let (_, reference, _) =
+            peaks.select_nth_unstable_by(REFERENCE_RANK, |a, b| b.0.total_cmp(&a.0));
+        let least = MIN_RELATIVE_STRENGTH * reference.0;
+        peaks.retain(|peak| peak.0 > least);
+    }
     // By strength, then by place: the order must not depend on how the sort works.
     peaks.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     peaks.truncate(most);
@@ -97,9 +109,10 @@ pub(super) fn saddles(level: &Level, most: usize) -> Vec<Saddle> {
 }
 
 /// −det H at every pixel but the border's.
-fn response(level: &Level) -> Vec<f32> {
+fn fill_response(level: &Level, response: &mut Vec<f32>) {
     let (width, height) = (level.width, level.height);
-    let mut response = vec![0.0_f32; width * height];
+    // The border keeps what an earlier image left there; no peak is sought so near it.
+    response.resize(width * height, 0.0);
     for y in 1..height - 1 {
         let [a, b, c] = [y - 1, y, y + 1].map(|y| &level.gray[y * width..][..width]);
         let n = width - 2;
@@ -115,7 +128,6 @@ fn response(level: &Level) -> Vec<f32> {
             out[i] = xy * xy - xx * yy;
         }
     }
-    response
 }
 
 /// The saddle at a peak of the response; `None` where its surroundings are not those of a chessboard's corner.
