@@ -18,7 +18,7 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
     let list: Vec<String> = case.problems.iter().map(ToString::to_string).collect();
     finding.summary = format!("{}.", list.join("; "));
     finding.what_to_do = if harmless {
-        "Nothing: frames are paired by time, so that what is missing costs only itself."
+        "Nothing need be done: frames are paired by time, so that what is missing costs only itself."
     } else {
         "Look whether files were lost on the way; what is missing was left out here."
     }

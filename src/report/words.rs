@@ -47,21 +47,28 @@ pub(super) fn rows(audit: &Audit) -> Vec<Row> {
 fn row(audit: &Audit, finding: &Finding) -> Row {
     let dash = || "—".to_owned();
     let factory = audit.factory.as_ref().map(|factory| &factory.intrinsics);
-    // Without an own camera the line against the board measures the focal length as much as the sensor.
-    let line = audit.own_depth.as_ref().and_then(|depth| depth.line.as_ref());
+    let judged =
+        finding.value.map(|value| Estimate { value, sigma: finding.sigma.unwrap_or(f64::NAN) });
     let (factory, measured) = match finding.code {
         Code::TD201 => (
             factory.map_or_else(dash, |f| format!("{} px", plain(f.focal_px(), 2))),
             focal(audit).map_or_else(dash, |focal| format!("{} px", value_and_sigma(focal, 2))),
         ),
         Code::TD203 => (dash(), audit.distortion_state.name().replace('_', " ")),
+        // The deviation that was judged (a slope or a mean ratio), so that both columns tell the same.
         Code::TD301 => {
-            ("1".to_owned(), line.map_or_else(dash, |line| value_and_sigma(line.scale, 4)))
+            ("1".to_owned(), judged.map_or_else(dash, |d| value_and_sigma(as_scale(d), 4)))
         }
         Code::TD302 => (
             "0 mm".to_owned(),
-            line.map_or_else(dash, |line| format!("{} mm", value_and_sigma(in_mm(line.bias_m), 2))),
+            judged.map_or_else(dash, |d| format!("{} mm", value_and_sigma(d, 2))),
         ),
+        Code::TD403 => {
+            let answer = |n: f64| {
+                if n > 0.0 { format!("in {} frames", plain(n, 0)) } else { "no".to_owned() }
+            };
+            (String::new(), finding.value.map_or_else(dash, answer))
+        }
         _ => (String::new(), fact(finding)),
     };
     Row {
@@ -71,6 +78,11 @@ fn row(audit: &Audit, finding: &Finding) -> Row {
         difference: difference(finding),
         verdict: Some((finding.code, finding.verdict)),
     }
+}
+
+/// A deviation in percent as a factor.
+fn as_scale(percent: Estimate) -> Estimate {
+    Estimate { value: 1.0 + percent.value / 100.0, sigma: percent.sigma / 100.0 }
 }
 
 /// A value that is no deviation: a number of things, an angle.
