@@ -9,7 +9,8 @@ use crate::geom::{Board, Color, Homography, Pixel, Point, Pose, Rotation};
 const AMBIGUOUS: f64 = 16.0;
 
 /// The poses of a plane (z = 0) that may explain how its points project to these directions (x/z, y/z), the better
-/// first: two, or one where the other is out of the question; `None` for fewer than four points or points of which three or more quarters lie on a line.
+/// first: two, or one where the other is out of the question; `None` for fewer than four points and for points on a
+/// line.
 ///
 /// A plane far away or small looks nearly the same tilted forth and back; noise decides which of both fits better, so
 /// that a caller must refine both. The method is IPPE (Collins and Bartoli, *Infinitesimal plane-based pose
