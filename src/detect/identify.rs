@@ -21,7 +21,7 @@
 //!
 //! N being the number of independent samples. It is blind deconvolution with a finite list of candidate images.
 
-use std::sync::OnceLock;
+use std::{ops::Range, sync::OnceLock};
 
 use crate::{
     board::{CharucoBoard, Layout},
@@ -288,7 +288,10 @@ impl Expected {
         lattice: &Lattice,
         map: &SmoothMap,
     ) -> Result<Placement, NotIdentified> {
-        self.best_by_bits(lattice, &cells(&self.board, image, lattice, map, true))
+        let cells = cells(&self.board, image, lattice, map, true);
+        // A mirrored placement is far from every other: it is tried only where no straight one convinces.
+        self.best_by_bits(lattice, &cells, 0..4)
+            .or_else(|_| self.best_by_bits(lattice, &cells, 0..8))
     }
 
     /// Lays the lattice onto the board where [`by_bits`](Self::by_bits) failed: under an unknown blur, then as a
@@ -301,9 +304,9 @@ impl Expected {
     ) -> Result<Placement, NotIdentified> {
         let bright = cells(&self.board, image, lattice, map, true);
         let dark = || cells(&self.board, image, lattice, map, false);
-        self.best_by_bits(lattice, &bright).or_else(|why| {
+        self.best_by_bits(lattice, &bright, 0..8).or_else(|why| {
             self.best_by_blur(lattice, &bright)
-                .or_else(|_| self.best_by_bits(lattice, &dark()))
+                .or_else(|_| self.best_by_bits(lattice, &dark(), 0..8))
                 .map_err(|_| why)
         })
     }
@@ -323,9 +326,10 @@ impl Expected {
     }
 
     /// Every placement that the colours of the squares allow, with the number of its markers.
-    fn placements(&self, lattice: &Lattice, cells: &[Cell]) -> Vec<Candidate> {
+    fn placements(&self, lattice: &Lattice, cells: &[Cell], turns: Range<usize>) -> Vec<Candidate> {
         let mut all = Vec::new();
-        for (turn, &matrix) in TURNS.iter().enumerate() {
+        for turn in turns {
+            let matrix = TURNS[turn];
             for shift in shifts(&self.board, lattice, matrix) {
                 for &layout in self.layouts {
                     let mut place = Placement {
@@ -369,7 +373,12 @@ impl Expected {
     }
 
     /// The placement whose markers the soft bits agree with.
-    fn best_by_bits(&self, lattice: &Lattice, cells: &[Cell]) -> Result<Placement, NotIdentified> {
+    fn best_by_bits(
+        &self,
+        lattice: &Lattice,
+        cells: &[Cell],
+        turns: Range<usize>,
+    ) -> Result<Placement, NotIdentified> {
         if cells.is_empty() {
             return Err(NotIdentified::NoMarkers);
         }
@@ -384,7 +393,7 @@ impl Expected {
             let (middle, half) = ((cell.rim + cell.border) / 2.0, (cell.rim - cell.border) / 2.0);
             ((cell.samples[k] - middle) / half).clamp(-1.5, 1.5)
         });
-        let mut candidates = self.placements(lattice, cells);
+        let mut candidates = self.placements(lattice, cells, turns);
         for candidate in &mut candidates {
             let mut score = 0.0_f32;
             for (cell, bits) in cells.iter().zip(values[candidate.turn].chunks_exact(n2)) {
@@ -419,7 +428,7 @@ impl Expected {
         let half = lattice.contrast as f32 / 2.0;
         let values = self.turned(cells, |cell, k| (cell.samples[k] - cell.rim) / half + 1.0);
         let blur = self.blur.get_or_init(|| BlurModel::new(self));
-        let mut candidates = self.placements(lattice, cells);
+        let mut candidates = self.placements(lattice, cells, 0..8);
         // Every pair of a cell and a marker is met by many placements: correlate it once.
         let mut memo: Vec<Option<Box<[f64; TAPS]>>> =
             vec![None; TURNS.len() * cells.len() * self.n_used];

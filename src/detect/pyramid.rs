@@ -15,9 +15,9 @@ pub(super) struct Level {
     /// Grey values 0..=255, smoothed.
     pub(super) gray: Vec<f32>,
     /// Memory of the block sums.
-    blocks: Vec<f32>,
+    blocks: Vec<u16>,
     /// Memory of one row.
-    column: Vec<f32>,
+    column: Vec<u16>,
 }
 
 impl Level {
@@ -30,23 +30,34 @@ impl Level {
         }
         (self.width, self.height, self.factor) = (width, height, factor);
         block_sums(image, factor, width, height, &mut self.blocks);
-        let scale = 1.0 / (256.0 * (factor * factor) as f32);
         self.gray.resize(width * height, 0.0);
-        self.column.resize(width + 4, 0.0);
+        self.column.resize(width + 4, 0);
         let column = &mut self.column[..width + 4];
+        let scale = 1.0 / (256.0 * unit(factor) as f32);
         for y in 0..height {
             // Beyond the border the outermost row repeats.
             let row = |dy: isize| {
                 let y = (y as isize + dy).clamp(0, height as isize - 1) as usize;
                 &self.blocks[y * width..][..width]
             };
-            binomial(&mut column[2..2 + width], [row(-2), row(-1), row(0), row(1), row(2)], scale);
+            let [a, b, c, d, e] = [row(-2), row(-1), row(0), row(1), row(2)];
+            let out = &mut column[2..2 + width];
+            for i in 0..width {
+                // At most 4080 · 16: it fits.
+                out[i] = (a[i] + e[i]) + 4 * (b[i] + d[i]) + 6 * c[i];
+            }
             column[0] = column[2];
             column[1] = column[2];
             column[width + 2] = column[width + 1];
             column[width + 3] = column[width + 1];
+            let [a, b, c, d, e] = [0, 1, 2, 3, 4].map(|dx| &column[dx..dx + width]);
             let out = &mut self.gray[y * width..][..width];
-            binomial(out, [0, 1, 2, 3, 4].map(|dx| &column[dx..dx + width]), 1.0);
+            for i in 0..width {
+                let wide = |v: u16| i32::from(v);
+                let sum =
+                    (wide(a[i]) + wide(e[i])) + 4 * (wide(b[i]) + wide(d[i])) + 6 * wide(c[i]);
+                out[i] = sum as f32 * scale;
+            }
         }
         Some(())
     }
@@ -66,25 +77,21 @@ impl Level {
     }
 }
 
-/// 1 4 6 4 1 across five slices of equal length, times `scale`.
-fn binomial(out: &mut [f32], [a, b, c, d, e]: [&[f32]; 5], scale: f32) {
-    let n = out.len();
-    let (a, b, c, d, e) = (&a[..n], &b[..n], &c[..n], &d[..n], &e[..n]);
-    for i in 0..n {
-        out[i] = ((a[i] + e[i]) + 4.0 * (b[i] + d[i]) + 6.0 * c[i]) * scale;
-    }
+/// What one grey level is in the block sums: the number of pixels, up to 16, so that sums fit into 16 bits even after
+/// the binomial filter.
+fn unit(factor: usize) -> usize {
+    (factor * factor).min(16)
 }
 
-/// The sum over each block.
-fn block_sums(image: &Gray, factor: usize, width: usize, height: usize, sums: &mut Vec<f32>) {
-    sums.resize(width * height, 0.0);
-    // u16 holds 256 rows of one column, and far more than any factor used.
-    let mut columns = vec![0_u16; width * factor];
+/// The sum over each block, in units of 1/[`unit`] grey level.
+fn block_sums(image: &Gray, factor: usize, width: usize, height: usize, sums: &mut Vec<u16>) {
+    sums.resize(width * height, 0);
+    let mut columns = vec![0_u32; if factor > 2 { width * factor } else { 0 }];
     for (y, out) in sums.chunks_exact_mut(width).enumerate() {
         match factor {
             1 => {
                 for (out, &p) in out.iter_mut().zip(image.row(y)) {
-                    *out = f32::from(p);
+                    *out = u16::from(p);
                 }
             }
             2 => {
@@ -92,20 +99,19 @@ fn block_sums(image: &Gray, factor: usize, width: usize, height: usize, sums: &m
                 for ((out, a), b) in
                     out.iter_mut().zip(top.chunks_exact(2)).zip(bottom.chunks_exact(2))
                 {
-                    *out = f32::from(
-                        u16::from(a[0]) + u16::from(a[1]) + u16::from(b[0]) + u16::from(b[1]),
-                    );
+                    *out = u16::from(a[0]) + u16::from(a[1]) + u16::from(b[0]) + u16::from(b[1]);
                 }
             }
             _ => {
                 columns.fill(0);
                 for dy in 0..factor {
                     for (sum, &p) in columns.iter_mut().zip(image.row(factor * y + dy)) {
-                        *sum += u16::from(p);
+                        *sum += u32::from(p);
                     }
                 }
+                let (unit, n) = (unit(factor) as u32, (factor * factor) as u32);
                 for (out, block) in out.iter_mut().zip(columns.chunks_exact(factor)) {
-                    *out = block.iter().map(|&s| f32::from(s)).sum();
+                    *out = ((block.iter().sum::<u32>() * unit + n / 2) / n) as u16;
                 }
             }
         }

@@ -75,8 +75,11 @@ pub(super) struct Refined {
     pub(super) sigma_px: f64,
 }
 
-/// Reach along a sharp edge, pixels: more adds cost, not accuracy that the printer has.
-const SHARP_REACH: f64 = 8.0;
+/// Reach along a sharp edge, pixels: more adds cost, not accuracy that the printer has. With it a window is 16 pixels
+/// wide, twice [`LANES`].
+const SHARP_REACH: f64 = 7.0;
+/// Reach along an edge beyond the blur of the other, pixels.
+const CLEAN_REACH: f64 = 4.5;
 /// Widths of the blur that the sum takes in, to each side of an edge and along the other.
 const BLUR_WIDTHS: f64 = 1.25;
 /// Longest reach, pixels: bounds the cost.
@@ -156,11 +159,11 @@ fn refine_at(
     // Blur across the edge along u widens the sum across that edge, and what the other edge must reach beyond.
     let [blur_u, blur_v] = blur.map(|b| BLUR_WIDTHS * b);
     let along = |blur: f64, length: f64| {
-        ((SHARP_REACH + blur - 4.0).clamp(SHARP_REACH, MAX_REACH) / length).min(REACH)
+        ((CLEAN_REACH + blur).clamp(SHARP_REACH, MAX_REACH) / length).min(REACH)
     };
     let width = |blur: f64, across: f64| {
         let rim = (guess.rim - MARKER_BLUR / across).max(MIN_WIDTH / across);
-        rim.min(blur.max(SHARP_REACH) / across).min(REACH)
+        rim.min((CLEAN_REACH + blur).max(SHARP_REACH) / across).min(REACH)
     };
     let (along_u, along_v) = (along(blur_v, lu), along(blur_u, lv));
     let (width_u, width_v) = (width(blur_u, across_u), width(blur_v, across_v));
