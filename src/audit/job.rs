@@ -451,3 +451,97 @@ fn why_not_calibrated(error: &calibrate::Error) -> String {
         other => other.to_string(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::{Arc, Mutex};
+
+    use super::*;
+    use crate::{
+        camera::Intrinsics,
+        image::{DepthMap, Rgb},
+        recording::{Limits, Memory, Writer},
+    };
+
+    /// Grey images without a board.
+    fn files() -> Memory {
+        let intrinsics =
+            Intrinsics { fx: 60.0, fy: 60.0, cx: 31.5, cy: 23.5, width: 64, height: 48 };
+        let factory = Factory::pinhole(intrinsics);
+        let mut writer = Writer::new(Memory::new("blank"));
+        for t_ms in [100, 600, 1100] {
+            let color = Rgb::new(64, 48, vec![[90; 3]; 64 * 48]);
+            let depth = DepthMap::new(64, 48, vec![0.3; 64 * 48]);
+            writer.frame(t_ms, &color, &depth, &factory).expect("writes");
+        }
+        writer.finish().expect("finishes")
+    }
+
+    fn open(files: Memory) -> Recording {
+        Recording::from_source(Arc::new(files), &Limits::default()).expect("opens")
+    }
+
+    fn options() -> Options {
+        let board = CharucoBoard::paper(0.020875).expect("a board");
+        Options { board: Some(board), ..Options::new(Method::Auto) }
+    }
+
+    #[test]
+    fn no_board_in_any_frame_is_no_error() {
+        let audit = audit(&open(files()), &options()).expect("an audit");
+        assert_eq!(audit.n_frames_with_board(), 0);
+        assert!(!audit.has_faults() && audit.calibration.is_none() && audit.camera.is_none());
+        assert!(audit.no_calibration.expect("a reason").contains("not seen in any frame"));
+        assert_eq!(audit.distortion_state, DistortionState::Unknown);
+        for finding in audit.findings.iter().filter(|f| f.verdict == Verdict::Unknown) {
+            assert!(!finding.what_to_do.is_empty(), "{finding:?}");
+        }
+        let unknown = audit.findings.iter().filter(|f| f.verdict == Verdict::Unknown).count();
+        assert!(unknown >= 5, "{unknown}");
+    }
+
+    #[test]
+    fn no_board_known() {
+        let error = audit(&open(files()), &Options::new(Method::Auto)).expect_err("no board");
+        assert!(matches!(error, Error::NoBoard { .. }), "{error}");
+        assert!(error.to_string().contains("--board"), "{error}");
+    }
+
+    #[test]
+    fn a_truncated_image_is_named() {
+        let mut cut = files();
+        let name = cut.files().keys().find(|n| n.contains("rgb_600")).expect("is there").clone();
+        let bytes = cut.get(&name).expect("is there");
+        let half = bytes[..bytes.len() / 2].to_vec();
+        cut.insert(name, half);
+        let error = audit(&open(cut), &options()).expect_err("half an image");
+        assert!(error.to_string().contains("rgb_600.png"), "{error}");
+    }
+
+    #[test]
+    fn a_camera_of_another_size() {
+        let intrinsics =
+            Intrinsics { fx: 60.0, fy: 60.0, cx: 31.5, cy: 23.5, width: 640, height: 480 };
+        let camera = Camera { intrinsics, distortion: Distortion::None };
+        let given = Options { method: Method::Given(Box::new(camera)), ..options() };
+        let error = audit(&open(files()), &given).expect_err("another size");
+        assert!(
+            matches!(error, Error::CameraSize { given: [640, 480], size: [64, 48], .. }),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn progress_counts_every_step_once() {
+        let seen = Mutex::new(Vec::new());
+        audit_observed(&open(files()), &options(), &|p| seen.lock().expect("no panic").push(p))
+            .expect("an audit");
+        let mut steps = seen.into_inner().expect("no panic");
+        steps.sort_by_key(|p| (p.stage, p.done));
+        let count =
+            |stage| steps.iter().filter(|p| p.stage == stage).map(|p| p.done).collect::<Vec<_>>();
+        assert_eq!(count(Stage::Detect), [0, 1, 2, 3]);
+        assert_eq!(count(Stage::Calibrate), [0, 1]);
+        assert_eq!(count(Stage::Judge), [0, 1]);
+    }
+}

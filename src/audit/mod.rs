@@ -7,6 +7,20 @@
 //!
 //! A recording in which no board is seen is not an error: the findings then say "cannot tell", and what to record.
 //!
+//! ```no_run
+//! use truedepth::{
+//!     audit::{Method, Options, audit},
+//!     recording::{Limits, Recording},
+//! };
+//!
+//! let recording = Recording::open("ipad", &Limits::default())?;
+//! let audit = audit(&recording, &Options::new(Method::Auto))?;
+//! for finding in &audit.findings {
+//!     println!("{} {}: {}", finding.code, finding.verdict.name(), finding.summary);
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! Not here: reading arguments, printing, time; pictures and files ([`report`](crate::report)).
 
 mod job;

@@ -11,6 +11,17 @@
 //! One file per finding; the text of `truedepth explain CODE` ([`Code::explanation`]) is that file's own
 //! documentation.
 //!
+//! ```
+//! use truedepth::{calibrate::Estimate, diagnose::{Code, Verdict}};
+//!
+//! // 6 % too long and sure of it; 6 % and anything but sure; surely within 1 %.
+//! let verdict = |value, sigma| Verdict::of(Estimate { value, sigma }, 0.01);
+//! assert_eq!(verdict(-0.06, 0.001), Verdict::Fault);
+//! assert_eq!(verdict(-0.06, 0.030), Verdict::Unknown);
+//! assert_eq!(verdict(0.002, 0.001), Verdict::Ok);
+//! assert!(Code::TD201.explanation().starts_with("# TD201: focal length"));
+//! ```
+//!
 //! Not here: pixels, pictures, and the corrections themselves: a finding names its correction, the shell applies it.
 
 mod case;
