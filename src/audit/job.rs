@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use super::{Method, Options, Progress, Stage};
 use crate::{
     board::{CharucoBoard, Layout},
-    calibrate::{self, Calibration, FrameCorners, RejectedFrame, Rejection},
+    calibrate::{self, BoardSurface, Calibration, FrameCorners, RejectedFrame, Rejection},
     camera::{Camera, Distortion},
     depth::{BoardDepth, against_board, sense},
     detect::{Corner, Detector, Observation},
@@ -200,8 +200,11 @@ pub fn audit_observed(
         frame.own_view = own.view(index, &board, corners);
     }
     let factory_depth =
-        factory.is_some().then(|| compare(&board, &frames, |f| f.factory_view.as_ref()));
-    let own_depth = own.camera.is_some().then(|| compare(&board, &frames, |f| f.own_view.as_ref()));
+        factory.is_some().then(|| compare(&board, None, &frames, |f| f.factory_view.as_ref()));
+    let own_depth = own
+        .camera
+        .is_some()
+        .then(|| compare(&board, own.surface(), &frames, |f| f.own_view.as_ref()));
     let (findings, distortion_state) = diagnose(&Case {
         problems: &recording.problems,
         n_frames,
@@ -324,6 +327,7 @@ fn most_seen_layout(frames: &[FrameAudit]) -> Option<Layout> {
 
 fn compare<'a>(
     board: &CharucoBoard,
+    surface: Option<&BoardSurface>,
     frames: &'a [FrameAudit],
     view: impl Fn(&'a FrameAudit) -> Option<&'a View>,
 ) -> BoardDepth {
@@ -346,7 +350,7 @@ fn compare<'a>(
         .collect();
     let pairs: Vec<_> =
         sensed.iter().map(|(view, sensor_m)| (*view, sensor_m.as_slice())).collect();
-    against_board(board, &pairs)
+    against_board(board, surface, &pairs)
 }
 
 /// The own camera, or why there is none.
@@ -358,6 +362,10 @@ struct Own {
 }
 
 impl Own {
+    fn surface(&self) -> Option<&BoardSurface> {
+        self.calibration.as_ref().and_then(|c| c.surface.as_ref())
+    }
+
     /// The board's pose in a frame with the own camera, corners left out that disagree with all others.
     fn view(&self, index: usize, board: &CharucoBoard, corners: &[Corner]) -> Option<View> {
         let camera = self.camera.as_ref()?;

@@ -2,10 +2,10 @@
 
 use crate::{
     board::CharucoBoard,
-    calibrate::Estimate,
+    calibrate::{BoardSurface, Estimate},
     depth::DepthLine,
     detect::Corner,
-    geom::Pixel,
+    geom::{Board, Pixel, Point},
     image::DepthMap,
     pose::View,
     solve::{mean, median, standard_error},
@@ -77,17 +77,39 @@ pub fn sense(map: &DepthMap, corners: &[Corner]) -> Vec<Option<f64>> {
     corners.iter().map(|corner| map.bilinear(corner.pixel)).collect()
 }
 
-/// Compares sensor and board. Each item is a view with what [`sense`] read at its corners (in the order of
-/// `view.corners`; panics where the lengths differ).
-pub fn against_board(board: &CharucoBoard, views: &[(&View, &[Option<f64>])]) -> BoardDepth {
+/// Compares sensor and board. The board is flat, or has the `surface` that a calibration found. Each item is a view with
+/// what [`sense`] read at its corners (in the order of `view.corners`; panics where the lengths differ).
+pub fn against_board(
+    board: &CharucoBoard,
+    surface: Option<&BoardSurface>,
+    views: &[(&View, &[Option<f64>])],
+) -> BoardDepth {
     let frames: Vec<FrameDepth> =
-        views.iter().map(|(view, sensed)| frame_depth(board, view, sensed)).collect();
+        views.iter().map(|(view, sensed)| frame_depth(board, surface, view, sensed)).collect();
     let medians: Vec<f64> = frames.iter().filter_map(|f| f.median_error_m).collect();
     let line = DepthLine::fit(board, &frames);
     BoardDepth { frames, mean_of_medians_m: mean_of(&medians), line }
 }
 
-fn frame_depth(board: &CharucoBoard, view: &View, sensed: &[Option<f64>]) -> FrameDepth {
+/// Where a corner lies on the board as it is.
+pub(crate) fn corner_on(
+    board: &CharucoBoard,
+    surface: Option<&BoardSurface>,
+    id: usize,
+) -> Point<Board> {
+    let mut point = board.corner(id);
+    if let Some(surface) = surface {
+        point.coords.z += surface.heights_m[id];
+    }
+    point
+}
+
+fn frame_depth(
+    board: &CharucoBoard,
+    surface: Option<&BoardSurface>,
+    view: &View,
+    sensed: &[Option<f64>],
+) -> FrameDepth {
     assert_eq!(view.corners.len(), sensed.len(), "one depth or hole per corner");
     let samples: Vec<Sample> = view
         .corners
@@ -98,7 +120,7 @@ fn frame_depth(board: &CharucoBoard, view: &View, sensed: &[Option<f64>]) -> Fra
                 frame: view.frame,
                 corner: corner.id,
                 pixel: corner.pixel,
-                board_m: (view.color_from_board * board.corner(corner.id)).z(),
+                board_m: (view.color_from_board * corner_on(board, surface, corner.id)).z(),
                 sensor_m: (*sensed)?,
             })
         })
@@ -177,7 +199,7 @@ mod tests {
         sensed[0] = None;
         sensed[1] = Some(0.221); // 21 mm beyond the board: dropped
         sensed[2] = Some(0.1801); // 19.9 mm before it: kept
-        let depth = against_board(board(), &[(&view, &sensed)]);
+        let depth = against_board(board(), None, &[(&view, &sensed)]);
         let frame = &depth.frames[0];
         assert_eq!((frame.frame, frame.n_holes, frame.n_beyond), (3, 1, 1));
         assert_eq!(frame.samples.len(), 62);
@@ -226,7 +248,7 @@ mod tests {
             })
             .collect();
         let pairs: Vec<_> = views.iter().zip(&sensed).map(|(v, s)| (v, s.as_slice())).collect();
-        against_board(board(), &pairs).line.unwrap()
+        against_board(board(), None, &pairs).line.unwrap()
     }
 
     #[test]
@@ -262,7 +284,7 @@ mod tests {
             })
             .collect();
         let pairs: Vec<_> = views.iter().zip(&sensed).map(|(v, s)| (v, s.as_slice())).collect();
-        let line = against_board(board(), &pairs).line.unwrap();
+        let line = against_board(board(), None, &pairs).line.unwrap();
         assert!(line.scale.sigma > 0.05, "{line:?}");
         assert!(
             (line.offset_m.value + 0.004).abs() < 3.0 * line.offset_m.sigma.max(1e-4),

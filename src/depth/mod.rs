@@ -24,7 +24,7 @@
 //!     rms_px: 0.0,
 //! };
 //! let map = DepthMap::new(8, 6, vec![0.198; 48]);
-//! let depth = against_board(&board, &[(&view, &sense(&map, &view.corners))]);
+//! let depth = against_board(&board, None, &[(&view, &sense(&map, &view.corners))]);
 //! let error_m = depth.frames[0].median_error_m.expect("one corner");
 //! assert!((error_m - 0.002).abs() < 1e-7); // the sensor measures 2 mm too near
 //! # Ok::<(), truedepth::board::Error>(())
@@ -36,6 +36,7 @@ mod against_board;
 mod clustered;
 mod line;
 
+pub(crate) use against_board::corner_on;
 pub use against_board::{BoardDepth, FrameDepth, MAX_ERROR_M, Sample, against_board, sense};
 pub(crate) use clustered::{Clustered, Equation};
 pub use line::DepthLine;

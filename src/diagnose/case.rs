@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     board::CharucoBoard,
-    calibrate::Calibration,
+    calibrate::{BoardSurface, Calibration},
     camera::Camera,
     depth::BoardDepth,
     detect::Observation,
@@ -52,6 +52,11 @@ impl Case<'_> {
     /// Frames in which the board was seen.
     pub(super) fn n_seen(&self) -> usize {
         self.observations.iter().filter(|o| !o.corners.is_empty()).count()
+    }
+
+    /// The board's shape, where a calibration found it not flat.
+    pub(super) fn surface(&self) -> Option<&BoardSurface> {
+        self.calibration.and_then(|c| c.surface.as_ref())
     }
 
     /// Why the own camera is not known, for the end of a sentence.

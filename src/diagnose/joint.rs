@@ -19,9 +19,9 @@ use nalgebra::{DMatrix, DVector, Matrix2x6, SMatrix};
 
 use crate::{
     board::CharucoBoard,
-    calibrate::Estimate,
+    calibrate::{BoardSurface, Estimate},
     camera::Intrinsics,
-    depth::{Clustered, Equation},
+    depth::{Clustered, Equation, corner_on},
     geom::{Pixel, Vector3},
     pose::View,
 };
@@ -89,18 +89,22 @@ struct Block {
     part: Vec<usize>,
 }
 
-/// Estimates from views whose poses were found with a camera of this pinhole, whatever its distortion. `None` where
+/// Estimates from views whose poses were found with a camera of this pinhole, whatever its distortion, of a board that is
+/// flat or has this surface. `None` where
 /// the views do not determine the parameters (fewer than two of them, say, or all fronto-parallel).
 pub(super) fn joint(
     board: &CharucoBoard,
+    surface: Option<&BoardSurface>,
     views: &[&View],
     pinhole: &Intrinsics,
     shape: Shape<'_>,
     freedom: Freedom,
 ) -> Option<Joint> {
     let p = freedom.n_parameters();
-    let blocks: Vec<Block> =
-        views.iter().filter_map(|view| block(board, view, pinhole, shape, freedom)).collect();
+    let blocks: Vec<Block> = views
+        .iter()
+        .filter_map(|view| block(board, surface, view, pinhole, shape, freedom))
+        .collect();
     if blocks.len() < 2 {
         return None;
     }
@@ -194,6 +198,7 @@ pub(super) fn joint(
 /// `None` for a view with fewer than six corners in front of the camera: its pose eats up all it says.
 fn block(
     board: &CharucoBoard,
+    surface: Option<&BoardSurface>,
     view: &View,
     pinhole: &Intrinsics,
     shape: Shape<'_>,
@@ -205,7 +210,7 @@ fn block(
     let mut residual = Vec::new();
     let mut part = Vec::new();
     for corner in &view.corners {
-        let point = (view.color_from_board * board.corner(corner.id)).coords;
+        let point = (view.color_from_board * corner_on(board, surface, corner.id)).coords;
         if point.z <= 0.0 {
             continue;
         }
@@ -364,7 +369,8 @@ mod tests {
         let board = CharucoBoard::paper(0.020875).unwrap();
         let views = views(&board, truth, fitted, wave_m, seed);
         let views: Vec<_> = views.iter().collect();
-        joint(&board, &views, &fitted.intrinsics, shape, Freedom::CentreAndDistortion).unwrap()
+        joint(&board, None, &views, &fitted.intrinsics, shape, Freedom::CentreAndDistortion)
+            .unwrap()
     }
 
     #[test]
@@ -452,7 +458,7 @@ mod tests {
             .collect();
         let views: Vec<_> = views.iter().collect();
         let flat = |_| Some([0.0; 2]);
-        let found = joint(&board, &views, &camera.intrinsics, &flat, Freedom::Focal);
+        let found = joint(&board, None, &views, &camera.intrinsics, &flat, Freedom::Focal);
         assert!(found.is_none_or(|j| j.focal_px.sigma > 0.05 * 596.0), "{found:?}");
     }
 }

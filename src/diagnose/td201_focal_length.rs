@@ -78,7 +78,7 @@ pub(super) fn measure(
                 Distortion::None | Distortion::Table(_) => Freedom::Focal,
                 Distortion::Brown(_) => Freedom::CentreAndDistortion,
             };
-            let spread = joint(case.board, &views, pinhole, &lens, freedom);
+            let spread = joint(case.board, case.surface(), &views, pinhole, &lens, freedom);
             (own_px, spread.map(|j| j.focal_px.sigma), Origin::Own)
         }
     };

@@ -66,7 +66,8 @@ impl Measured<'_> {
     /// The focal length once this distortion is taken out, for an own camera that knows of none.
     pub(super) fn focal_px(&self, case: &Case<'_>, pinhole: &Intrinsics) -> Option<Estimate> {
         let shape = |pixel| self.shape.displacement(pixel);
-        joint(case.board, case.own_views, pinhole, &shape, Freedom::Distortion).map(|j| j.focal_px)
+        joint(case.board, case.surface(), case.own_views, pinhole, &shape, Freedom::Distortion)
+            .map(|j| j.focal_px)
     }
 }
 
@@ -105,8 +106,14 @@ pub(super) fn measure<'a>(case: &Case<'a>) -> Option<Measured<'a>> {
         (None, _) => (Shape::Cubic { center, radius_px: seen_px }, 1.0, seen_px),
     };
     let displacement = |pixel| shape.displacement(pixel);
-    let joint =
-        joint(case.board, case.own_views, pinhole, &displacement, Freedom::CentreAndDistortion)?;
+    let joint = joint(
+        case.board,
+        case.surface(),
+        case.own_views,
+        pinhole,
+        &displacement,
+        Freedom::CentreAndDistortion,
+    )?;
     Some(Measured { shape, joint, reference_px, radius_px })
 }
 
@@ -170,7 +177,7 @@ pub(super) fn check(
             format!(
                 "{:.0} % +- {:.0} % of the distortion in Apple's table is in the images, {value:+.2} +- {sigma:.2} px \
                  at the image's corner; residuals are {:.2} px taken as rectified and {:.2} px with the table applied",
-                100.0 * amount.value,
+                (100.0 * amount.value).round() + 0.0, // no "-0"
                 100.0 * amount.sigma,
                 rms_rectified_px,
                 rms_distorted_px,

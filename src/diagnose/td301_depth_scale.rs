@@ -113,7 +113,7 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
         Verdict::Unknown => (
             judge(ratio),
             ratio,
-            "mean ratio of sensor to board; the distances are too alike to tell a scale from a bias",
+            "mean ratio of sensor to board; the slope over distance is too uncertain to decide",
         ),
         // A slope that a bias makes up for at every distance recorded has harmed nobody.
         Verdict::Fault if !somewhere => (

@@ -122,7 +122,7 @@ impl World {
         }
         let compare = |views: &[View]| -> BoardDepth {
             let pairs: Vec<_> = views.iter().zip(&sensed).map(|(v, s)| (v, s.as_slice())).collect();
-            against_board(&BOARD, &pairs)
+            against_board(&BOARD, None, &pairs)
         };
         let factory_depth = compare(&factory_views);
         let own_depth = self.own.is_some().then(|| compare(&own_views));

@@ -31,7 +31,7 @@ pub(super) fn audit() -> Audit {
     let depth = |view: fn(&FrameAudit) -> Option<&View>| {
         let views: Vec<(&View, &[Option<f64>])> =
             frames.iter().filter_map(|f| Some((view(f)?, f.sensor_m.as_slice()))).collect();
-        against_board(&board, &views)
+        against_board(&board, None, &views)
     };
     let mut factory = Factory::pinhole(intrinsics(FACTORY_FOCAL_PX));
     factory.reference_dimensions = Some([2016.0, 1512.0]);
