@@ -77,8 +77,8 @@ pub fn sense(map: &DepthMap, corners: &[Corner]) -> Vec<Option<f64>> {
     corners.iter().map(|corner| map.bilinear(corner.pixel)).collect()
 }
 
-/// Compares sensor and board. The board is flat, or has the `surface` that a calibration found. Each item is a view with
-/// what [`sense`] read at its corners (in the order of `view.corners`; panics where the lengths differ).
+/// Compares sensor and board. The board is flat, or has the `surface` that a calibration found. Each item is a view
+/// with what [`sense`] read at its corners (in the order of `view.corners`; panics where the lengths differ).
 pub fn against_board(
     board: &CharucoBoard,
     surface: Option<&BoardSurface>,

@@ -89,9 +89,9 @@ struct Block {
     part: Vec<usize>,
 }
 
-/// Estimates from views whose poses were found with a camera of this pinhole, whatever its distortion, of a board that is
-/// flat or has this surface. `None` where
-/// the views do not determine the parameters (fewer than two of them, say, or all fronto-parallel).
+/// Estimates from views whose poses were found with a camera of this pinhole, whatever its distortion, of a board that
+/// is flat or has this surface. `None` where the views do not determine the parameters (fewer than two of them, say, or
+/// all fronto-parallel).
 pub(super) fn joint(
     board: &CharucoBoard,
     surface: Option<&BoardSurface>,
