@@ -26,7 +26,8 @@
 //!         let azimuth = f64::from(i) * 0.8;
 //!         let turn = Rotation::from_scaled_axis(Vector3::new(azimuth.cos(), azimuth.sin(), 0.0) * 0.6);
 //!         let centre = Vector3::new(0.104, 0.0835, 0.0);
-//!         let pose: Pose<Color, Board> = Pose::new(turn, Vector3::new(0.0, 0.0, 0.3) - turn * centre);
+//!         let middle = Vector3::new(0.0, 0.0, 0.25 + 0.03 * f64::from(i)); // eight different pictures
+//!         let pose: Pose<Color, Board> = Pose::new(turn, middle - turn * centre);
 //!         let see = |id| Some(Corner { id, pixel: camera.project(pose * board.corner(id))?, sigma_px: 0.05 });
 //!         FrameCorners { frame: i as usize, corners: (0..board.n_corners()).filter_map(see).collect() }
 //!     })
