@@ -77,6 +77,7 @@ const MIN_SIGNIFICANCE: f64 = 6.0;
 const MIN_CELL_CONTRAST: f64 = 0.2;
 
 /// A lattice cell that shows a marker.
+#[derive(Clone)]
 struct Cell {
     i: i32,
     j: i32,
@@ -424,11 +425,18 @@ impl Expected {
         if cells.len() < 4 {
             return Err(NotIdentified::Ambiguous); // Too few samples for a kernel.
         }
+        // The work grows with placements times cells: a sample of the cells does, and a small part of a huge board is
+        // left alone.
+        let step = cells.len().div_ceil(MOST_BLURRED_CELLS);
+        let cells: Vec<Cell> = cells.iter().step_by(step).cloned().collect();
+        let mut candidates = self.placements(lattice, &cells, 0..8);
+        if candidates.len() * cells.len() > MOST_BLURRED_TRIALS {
+            return Err(NotIdentified::Ambiguous);
+        }
         let n2 = self.size * self.size;
         let half = lattice.contrast as f32 / 2.0;
-        let values = self.turned(cells, |cell, k| (cell.samples[k] - cell.rim) / half + 1.0);
+        let values = self.turned(&cells, |cell, k| (cell.samples[k] - cell.rim) / half + 1.0);
         let blur = self.blur.get_or_init(|| BlurModel::new(self));
-        let mut candidates = self.placements(lattice, cells, 0..8);
         // Every pair of a cell and a marker is met by many placements: correlate it once.
         let mut memo: Vec<Option<Box<[f64; TAPS]>>> =
             vec![None; TURNS.len() * cells.len() * self.n_used];
@@ -505,6 +513,10 @@ fn accept(placement: Placement) -> Result<Placement, NotIdentified> {
 const REACH: i32 = 3;
 /// Unknowns of the blur: its kernel and a constant.
 const TAPS: usize = 50;
+/// Cells that a blurred reading takes in at most.
+const MOST_BLURRED_CELLS: usize = 64;
+/// Pairs of a placement and a cell at most: about a tenth of a second.
+const MOST_BLURRED_TRIALS: usize = 60_000;
 /// Blurred samples are far from independent: this many count as one.
 const SAMPLES_PER_VOTE: f64 = 4.0;
 
