@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Parser, Subcommand, ValueEnum, builder::PossibleValuesParser};
 use truedepth::{
-    board::{self, CharucoBoard},
+    board::{self, CharucoBoard, Dictionary},
     simulate::{Device, Fault, FaultError},
 };
 
@@ -125,6 +125,18 @@ pub(crate) enum Command {
     #[command(after_help = DEMO_EXAMPLES)]
     Demo(DemoArgs),
 
+    /// Print the board: a PDF, SVG or PNG true to scale, and the board.toml for recordings of it
+    ///
+    /// On the page stand the board, a ruler of 100 mm to check the scale of the print, and the board's parameters.
+    /// Print at 100 % ("actual size", not "fit to page"), glue it onto something flat, measure squares, and correct
+    /// board.toml where the printer has scaled. Then put board.toml into every recording.
+    ///
+    /// The board, unless --board says otherwise, is 10x7 squares of 24 mm with markers of 18 mm from 5X5_100. It fills
+    /// A4 and fits Letter; an odd number of rows is the same in OpenCV's old and new layout; markers of 3/4 of a square
+    /// are read from far, and leave enough white for the corners to be precise.
+    #[command(after_help = BOARD_EXAMPLES)]
+    Board(PrintArgs),
+
     /// Render a recording with known truth and chosen faults
     ///
     /// Writes the same files as the capture app, and truth.json with what is true of them. The same options give the
@@ -168,9 +180,9 @@ pub(crate) struct BoardArgs {
     ///
     /// Needed where the recording brings neither a board.toml nor a checkersize.txt; given here it goes before both.
     /// In short form: squares along x and y, side of a square, side of a marker (black border included), dictionary
-    /// as OpenCV names it, and `legacy` or `new` if the layout is known (else it is found from the images), like
-    /// 10x8:20.875mm:10.4375mm:ARUCO_ORIGINAL. Lengths carry a unit (mm, cm, m, in). Measure the print: printers
-    /// scale.
+    /// as OpenCV names it or a file of OpenCV's form (mine.yml), and `legacy` or `new` if the layout is known (else it
+    /// is found from the images), like 10x8:20.875mm:10.4375mm:ARUCO_ORIGINAL. Lengths carry a unit (mm, cm, m, in).
+    /// Measure the print: printers scale.
     #[arg(long, value_name = "FILE|SPEC", value_parser = board_argument)]
     pub(crate) board: Option<BoardArgument>,
 }
@@ -182,12 +194,37 @@ pub(crate) enum BoardArgument {
     File(PathBuf),
     /// The short form.
     Board(CharucoBoard),
+    /// The short form with a dictionary that is a file.
+    WithFile(String),
+}
+
+/// Why a board in short form is none yet.
+enum NotYet {
+    /// Its dictionary is a file.
+    File,
+    /// It can never be one.
+    Wrong(board::Error),
+}
+
+impl From<board::Error> for NotYet {
+    fn from(error: board::Error) -> Self {
+        Self::Wrong(error)
+    }
 }
 
 /// The short form has colons; so have paths on Windows, but those end like a file.
 fn board_argument(text: &str) -> Result<BoardArgument, board::Error> {
     if text.contains(':') && !text.ends_with(".toml") {
-        return Ok(BoardArgument::Board(text.parse()?));
+        // The dictionary comes last: all that stands before it is checked even where it is a file, read later.
+        let board = CharucoBoard::from_short_form(text, |name| match Dictionary::is_file(name) {
+            true => Err(NotYet::File),
+            false => Ok(Dictionary::predefined(name)?),
+        });
+        return match board {
+            Ok(board) => Ok(BoardArgument::Board(board)),
+            Err(NotYet::File) => Ok(BoardArgument::WithFile(text.to_owned())),
+            Err(NotYet::Wrong(error)) => Err(error),
+        };
     }
     Ok(BoardArgument::File(PathBuf::from(text)))
 }
@@ -363,6 +400,114 @@ Examples:
   truedepth demo
   truedepth demo --open
   truedepth demo --seed 7 -o another-demo";
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct PrintArgs {
+    /// The file to write: .pdf, .svg or .png
+    ///
+    /// A board.toml is written into the same folder.
+    #[arg(short, long, value_name = "FILE", value_parser = printed_file)]
+    pub(crate) output: PrintedFile,
+
+    /// The board: a board.toml, SQUARES:SQUARE:MARKER:DICTIONARY, or `paper`
+    ///
+    /// In short form: squares along x and y, side of a square, side of a marker (black border included), dictionary
+    /// as OpenCV names it or a file of OpenCV's form (mine.yml); `legacy` or `new` may follow. `paper` is the board of
+    /// arXiv:2201.10865, 10x8:20.875mm:10.4375mm:ARUCO_ORIGINAL:legacy.
+    #[arg(long, value_name = "FILE|SPEC|paper", default_value = "10x7:24mm:18mm:5X5_100", value_parser = print_board)]
+    pub(crate) board: BoardArgument,
+
+    /// The paper
+    #[arg(long, value_name = "SIZE", default_value = "a4")]
+    pub(crate) paper: PaperSize,
+
+    /// How the paper is held
+    #[arg(long, value_name = "WAY", default_value = "auto")]
+    pub(crate) orientation: OrientationChoice,
+
+    /// Which squares are white, where --board does not say it [default: new]
+    ///
+    /// `new` is OpenCV 4.6 and later, `legacy` what came before. They differ for an even number of rows only.
+    #[arg(long, value_name = "LAYOUT")]
+    pub(crate) layout: Option<LayoutChoice>,
+
+    /// Pixels per inch of a PNG [default: 300]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(50..=1200))]
+    pub(crate) dpi: Option<u32>,
+
+    /// Replace files that are there already
+    #[arg(long)]
+    pub(crate) force: bool,
+}
+
+const BOARD_EXAMPLES: &str = "\
+Examples:
+  truedepth board -o board.pdf
+  truedepth board -o a3.pdf --paper a3 --board 12x9:30mm:22mm:5X5_250
+  truedepth board -o paper/board.pdf --board paper
+  truedepth board -o board.png --dpi 600 --board 7x5:30mm:21mm:mine.yml";
+
+/// Where the board goes, and as what.
+#[derive(Clone, Debug)]
+pub(crate) struct PrintedFile {
+    pub(crate) path: PathBuf,
+    pub(crate) format: PrintFormat,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum PrintFormat {
+    Pdf,
+    Svg,
+    Png,
+}
+
+fn printed_file(text: &str) -> Result<PrintedFile, String> {
+    let path = PathBuf::from(text);
+    let extension =
+        path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    let format = match extension.as_str() {
+        "pdf" => PrintFormat::Pdf,
+        "svg" => PrintFormat::Svg,
+        "png" => PrintFormat::Png,
+        _ => return Err("the name must end in .pdf, .svg or .png".to_owned()),
+    };
+    Ok(PrintedFile { path, format })
+}
+
+fn print_board(text: &str) -> Result<BoardArgument, board::Error> {
+    if text == "paper" {
+        return board_argument("10x8:20.875mm:10.4375mm:ARUCO_ORIGINAL:legacy");
+    }
+    board_argument(text)
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PaperSize {
+    /// 210 x 297 mm
+    A4,
+    /// 297 x 420 mm
+    A3,
+    /// 8.5 x 11 in
+    Letter,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum OrientationChoice {
+    /// As the board fits best
+    Auto,
+    /// The long side upright
+    Portrait,
+    /// The long side across
+    Landscape,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum LayoutChoice {
+    /// OpenCV 4.6 and newer
+    New,
+    /// OpenCV before 4.6
+    Legacy,
+}
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct SimulateArgs {

@@ -80,6 +80,37 @@ pub(crate) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), Failure>
     })
 }
 
+/// New files that belong together. They replace what is there where that was asked for; else a file that is there already
+/// and holds anything else is refused before any is written.
+pub(crate) fn write_together(
+    files: &[(PathBuf, Vec<u8>)],
+    replace: Replace,
+) -> Result<(), Failure> {
+    if replace == Replace::Nothing {
+        for (path, bytes) in files {
+            if path.exists() && !fs::read(path).is_ok_and(|there| there == *bytes) {
+                let message = format!("{} is there already; nothing was written", path.display());
+                return Err(
+                    Failure::new(message).hint("--force replaces it; or name another folder")
+                );
+            }
+        }
+    }
+    if let Some(folder) = files.first().and_then(|(path, _)| path.parent()) {
+        fs::create_dir_all(folder).map_err(|e| {
+            Failure::from(e).within(format!("cannot make the folder {}", folder.display()))
+        })?;
+    }
+    files.iter().try_for_each(|(path, bytes)| write_atomically(path, bytes))
+}
+
+/// What may be written over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Replace {
+    Nothing,
+    WhatIsThere,
+}
+
 /// An address a browser opens, for an existing file.
 pub(crate) fn file_url(path: &Path) -> String {
     let absolute = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());

@@ -6,7 +6,7 @@ use std::{
 };
 
 use truedepth::{
-    board::CharucoBoard,
+    board::{CharucoBoard, Dictionary},
     camera::Camera,
     image,
     recording::{self, Found, Limits, board_from_toml},
@@ -104,18 +104,43 @@ fn unreadable(path: &Path, e: std::io::Error) -> Failure {
 
 /// The board that was given, if one was.
 pub(crate) fn board(args: &BoardArgs) -> Result<Option<CharucoBoard>, Failure> {
-    match &args.board {
-        None => Ok(None),
-        Some(BoardArgument::Board(board)) => Ok(Some(board.clone())),
-        Some(BoardArgument::File(path)) => {
-            let toml = fs::read_to_string(path).map_err(|e| {
-                unreadable(path, e).hint(
+    args.board.as_ref().map(board_of).transpose()
+}
+
+/// The board that was typed.
+pub(crate) fn board_of(argument: &BoardArgument) -> Result<CharucoBoard, Failure> {
+    match argument {
+        BoardArgument::Board(board) => Ok(board.clone()),
+        BoardArgument::WithFile(text) => CharucoBoard::from_short_form(text, |name| {
+            let path = Path::new(name);
+            let file = path.file_name().unwrap_or_default().to_string_lossy();
+            let yaml = text_of(path)?;
+            Dictionary::from_opencv_yaml(&file, &yaml)
+                .map_err(|e| Failure::from(e).within(format!("cannot use the dictionary {name}")))
+        }),
+        BoardArgument::File(path) => {
+            let toml = text_of(path).map_err(|failure| {
+                failure.hint(
                     "--board takes a board.toml, or text like 10x8:20.875mm:10.4375mm:ARUCO_ORIGINAL",
                 )
             })?;
-            Ok(Some(board_from_toml(&path.display().to_string(), &toml)?))
+            let beside = |name: &str| {
+                let path = path.with_file_name(name);
+                fs::read(&path).map_err(|e| recording::Error::Board {
+                    file: path.display().to_string(),
+                    why: format!(
+                        "{e}; the dictionary that a board.toml names has to lie beside it"
+                    ),
+                })
+            };
+            Ok(board_from_toml(&path.display().to_string(), &toml, beside)?)
         }
     }
+}
+
+/// A file that is text.
+fn text_of(path: &Path) -> Result<String, Failure> {
+    fs::read_to_string(path).map_err(|e| unreadable(path, e))
 }
 
 /// The camera that `truedepth calibrate --json` or `audit --json` wrote.

@@ -1,8 +1,8 @@
 //! ChArUco boards.
 
-use std::str::FromStr;
+use std::{fmt, str::FromStr};
 
-use super::{Dictionary, Error, length_m};
+use super::{Dictionary, Error, length_m, length_text};
 use crate::geom::{Board, Point};
 
 /// Which squares are white. OpenCV changed it in 4.6; the two differ only for boards with an even number of rows.
@@ -172,34 +172,51 @@ impl CharucoBoard {
     }
 }
 
-impl FromStr for CharucoBoard {
-    type Err = Error;
-
-    /// Reads `SQUARES_XxSQUARES_Y:SQUARE:MARKER:DICTIONARY[:legacy|:new]`, e.g.
-    /// `10x8:20.875mm:10.4375mm:ARUCO_ORIGINAL`. Lengths carry their unit.
-    fn from_str(text: &str) -> Result<Self, Error> {
+impl CharucoBoard {
+    /// Reads the short form, `SQUARES_XxSQUARES_Y:SQUARE:MARKER:DICTIONARY[:legacy|:new]`; `dictionary` answers the
+    /// name that stands in it, which may be that of a file ([`Dictionary::is_file`]).
+    pub fn from_short_form<E: From<Error>>(
+        text: &str,
+        dictionary: impl FnOnce(&str) -> Result<Dictionary, E>,
+    ) -> Result<Self, E> {
         let form = || Error::Form(text.to_owned());
-        let parts: Vec<&str> = text.split(':').collect();
-        let (squares, square, marker, dictionary, layout) = match parts[..] {
-            [squares, square, marker, dictionary] => (squares, square, marker, dictionary, None),
-            [squares, square, marker, dictionary, "legacy"] => {
-                (squares, square, marker, dictionary, Some(Layout::Legacy))
-            }
-            [squares, square, marker, dictionary, "new"] => {
-                (squares, square, marker, dictionary, Some(Layout::New))
-            }
-            _ => return Err(form()),
+        // Paths may have colons of their own, on Windows they do.
+        let mut parts = text.splitn(4, ':');
+        let mut part = || parts.next().ok_or_else(form);
+        let (squares, square, marker, rest) = (part()?, part()?, part()?, part()?);
+        let (name, layout) = match rest.rsplit_once(':') {
+            Some((name, "legacy")) => (name, Some(Layout::Legacy)),
+            Some((name, "new")) => (name, Some(Layout::New)),
+            Some(_) if !Dictionary::is_file(rest) => return Err(form().into()),
+            _ => (rest, None),
         };
         let (x, y) = squares.split_once(['x', 'X']).ok_or_else(form)?;
         let count = |text: &str| text.trim().parse::<usize>().map_err(|_| form());
-        let mut board = Self::new(
-            (count(x)?, count(y)?),
-            length_m(square)?,
-            length_m(marker)?,
-            Dictionary::predefined(dictionary.trim())?,
-        )?;
+        let squares = (count(x)?, count(y)?);
+        let (square_m, marker_m) = (length_m(square)?, length_m(marker)?);
+        let mut board = Self::new(squares, square_m, marker_m, dictionary(name.trim())?)?;
         board.layout = layout;
         Ok(board)
+    }
+}
+
+impl FromStr for CharucoBoard {
+    type Err = Error;
+
+    /// Reads the short form with a predefined dictionary, e.g. `10x8:20.875mm:10.4375mm:ARUCO_ORIGINAL`. Lengths
+    /// carry their unit.
+    fn from_str(text: &str) -> Result<Self, Error> {
+        Self::from_short_form(text, Dictionary::predefined)
+    }
+}
+
+impl fmt::Display for CharucoBoard {
+    /// The short form; [`from_short_form`](CharucoBoard::from_short_form) reads the same board back.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (square, marker) = (length_text(self.square_m), length_text(self.marker_m));
+        let (x, y, dictionary) = (self.squares_x, self.squares_y, self.dictionary.name());
+        write!(f, "{x}x{y}:{square}:{marker}:{dictionary}")?;
+        self.layout.map_or(Ok(()), |layout| write!(f, ":{}", layout.name()))
     }
 }
 
@@ -257,5 +274,34 @@ mod tests {
         ] {
             assert!(text.parse::<CharucoBoard>().is_err(), "{text}");
         }
+    }
+
+    #[test]
+    fn the_short_form_reads_back() {
+        for text in [
+            "10x8:20.875mm:10.4375mm:ARUCO_ORIGINAL",
+            "10x7:24mm:18mm:5X5_100:new",
+            "5x7:0.033333333333333333m:1in:APRILTAG_36h11:legacy",
+        ] {
+            let board: CharucoBoard = text.parse().unwrap();
+            assert_eq!(board.to_string().parse(), Ok(board), "{text}");
+        }
+        let text = "10x7:24mm:18mm:5X5_100:new";
+        assert_eq!(text.parse::<CharucoBoard>().unwrap().to_string(), text);
+
+        // The name of a file may have colons; a layout may follow it.
+        for (rest, name, layout) in [
+            ("mine.yml", "mine.yml", None),
+            ("C:\\mine.yml:new", "C:\\mine.yml", Some(Layout::New)),
+            ("C:\\mine.YAML", "C:\\mine.YAML", None),
+        ] {
+            let board = CharucoBoard::from_short_form(&format!("3x3:2cm:1cm:{rest}"), |asked| {
+                assert_eq!(asked, name);
+                Dictionary::predefined("4X4_50")
+            });
+            assert_eq!(board.unwrap().layout, layout, "{rest}");
+        }
+        let error = "10x8:20mm:10mm:4X4_50:middle".parse::<CharucoBoard>().unwrap_err();
+        assert!(matches!(error, Error::Form(_)), "{error}");
     }
 }

@@ -6,9 +6,9 @@ use super::Error;
 /// without the black border of one cell that surrounds every marker.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dictionary {
-    name: String,
-    bits: usize,
-    codes: Vec<u64>,
+    pub(super) name: String,
+    pub(super) bits: usize,
+    pub(super) codes: Vec<u64>,
 }
 
 /// name, file, prefix length: OpenCV's smaller dictionaries are prefixes of the largest of their family.
@@ -74,7 +74,7 @@ impl Dictionary {
         Ok(Self { name: (*name).to_owned(), bits, codes })
     }
 
-    /// The name, without the prefix `DICT_`.
+    /// The name, without the prefix `DICT_`; of a dictionary of one's own, the name of its file.
     pub fn name(&self) -> &str {
         &self.name
     }

@@ -25,6 +25,14 @@ pub fn length_m(text: &str) -> Result<f64, Error> {
     Ok(value * metres_per_unit)
 }
 
+/// A length with its unit, as a person would write it; [`length_m`] reads exactly the same number back.
+///
+/// Millimetres with at most six digits after the point where that says it all, else metres with all digits.
+pub fn length_text(metres: f64) -> String {
+    let millimetres = format!("{}mm", (metres * 1e9).round() / 1e6);
+    if length_m(&millimetres) == Ok(metres) { millimetres } else { format!("{metres}m") }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -42,6 +50,15 @@ mod tests {
         }
         for text in ["20.875", "", "mm", "nanmm", "infm", "20 furlongs", "1e999m"] {
             assert!(length_m(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn lengths_come_back_to_the_last_bit() {
+        assert_eq!(length_text(length_m("20.875mm").unwrap()), "20.875mm");
+        assert_eq!(length_text(length_m("24mm").unwrap()), "24mm");
+        for metres in [0.020875, 0.0104375, 0.1 + 0.2, 1.0 / 3.0, 0.0254 / 7.0, 1e-4, 10.0] {
+            assert_eq!(length_m(&length_text(metres)), Ok(metres), "{metres}");
         }
     }
 }

@@ -13,15 +13,21 @@
 //! # Ok::<(), truedepth::board::Error>(())
 //! ```
 //!
-//! Not here: files (`board.toml` is read by [`recording`](crate::recording)), detection, printing.
+//! A [`Sheet`] is the board on [`Paper`], true to scale, with a ruler to check the print: rectangles and lines of text
+//! in millimetres, for [`report`](crate::report) to turn into PDF, SVG or PNG.
+//!
+//! Not here: files (`board.toml` is read by [`recording`](crate::recording)), detection, file formats.
 
 mod charuco;
 mod dictionary;
+mod dictionary_file;
 mod length;
+mod sheet;
 
 pub use charuco::{CharucoBoard, Layout, MarkerCell};
 pub use dictionary::Dictionary;
-pub use length::length_m;
+pub use length::{length_m, length_text};
+pub use sheet::{Orientation, Paper, Rect, Sheet, Text};
 
 /// A board that cannot be.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -33,7 +39,10 @@ pub enum Error {
     )]
     Length(String),
     /// A dictionary nobody knows.
-    #[error("`{0}` is not a known dictionary; known are {known}", known = Dictionary::NAMES.join(", "))]
+    #[error(
+        "`{0}` is not a known dictionary; known are {known}, and files of OpenCV's form, like mine.yml",
+        known = Dictionary::NAMES.join(", ")
+    )]
     Dictionary(String),
     /// Text that does not follow the short form of a board.
     #[error(
@@ -44,4 +53,24 @@ pub enum Error {
     /// Lengths or counts that make no board.
     #[error("not a board: {0}")]
     Geometry(String),
+    /// A file that holds no dictionary.
+    #[error("{file}, line {line}: {why}")]
+    DictionaryFile {
+        /// The name of the file.
+        file: String,
+        /// The line, counted from 1.
+        line: usize,
+        /// What is wrong, and the remedy.
+        why: String,
+    },
+    /// A board larger than the paper.
+    #[error("a board of {board} does not fit on {paper}: {remedy}")]
+    Paper {
+        /// Its size.
+        board: String,
+        /// The paper, and the room on it.
+        paper: String,
+        /// The largest square that fits, and the paper on which the board does.
+        remedy: String,
+    },
 }

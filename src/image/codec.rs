@@ -65,6 +65,27 @@ impl Gray {
         let size = (self.width(), self.height());
         encode(size, png::ColorType::Grayscale, png::BitDepth::Eight, self.pixels())
     }
+
+    /// As [`to_png`](Self::to_png), but small rather than fast, and with the scale at which it is meant to be printed,
+    /// pixels per inch. PNG stores it to a whole number of pixels per metre.
+    pub fn to_png_at(&self, dpi: f64) -> Vec<u8> {
+        let per_metre = (dpi / 0.0254).round() as u32;
+        let size = (self.width(), self.height());
+        encode_with(
+            size,
+            png::ColorType::Grayscale,
+            png::BitDepth::Eight,
+            self.pixels(),
+            |encoder| {
+                encoder.set_compression(png::Compression::Balanced);
+                encoder.set_pixel_dims(Some(png::PixelDimensions {
+                    xppu: per_metre,
+                    yppu: per_metre,
+                    unit: png::Unit::Meter,
+                }));
+            },
+        )
+    }
 }
 
 impl Rgb {
@@ -230,10 +251,20 @@ fn damaged(error: png::DecodingError) -> Error {
 }
 
 fn encode(
+    size: (usize, usize),
+    color: png::ColorType,
+    depth: png::BitDepth,
+    data: &[u8],
+) -> Vec<u8> {
+    encode_with(size, color, depth, data, |_| ())
+}
+
+fn encode_with(
     (width, height): (usize, usize),
     color: png::ColorType,
     depth: png::BitDepth,
     data: &[u8],
+    more: impl FnOnce(&mut png::Encoder<'_, &mut Vec<u8>>),
 ) -> Vec<u8> {
     let side = |n: usize| u32::try_from(n).expect("an image in memory has fewer than 2³² columns");
     let mut bytes = Vec::new();
@@ -241,6 +272,7 @@ fn encode(
     encoder.set_color(color);
     encoder.set_depth(depth);
     encoder.set_compression(png::Compression::Fast);
+    more(&mut encoder);
     encoder
         .write_header()
         .and_then(|mut writer| {

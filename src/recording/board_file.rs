@@ -8,28 +8,43 @@ use serde::{
 };
 
 use super::Error;
-use crate::board::{CharucoBoard, Dictionary, Layout, length_m};
+use crate::board::{CharucoBoard, Dictionary, Layout, length_m, length_text};
 
-/// A board from the text of a `board.toml`; `file` is its name for messages.
+/// A board from the text of a `board.toml`; `file` is its name for messages, and `beside` reads a file beside it.
 ///
 /// ```toml
 /// squares_x = 10                  # squares along a row
 /// squares_y = 8                   # squares along a column
 /// square = "20.875mm"             # side of a square, with its unit: mm, cm, m, in
 /// marker = "10.4375mm"            # side of a marker with its black border
-/// dictionary = "ARUCO_ORIGINAL"   # a name of OpenCV's, with or without DICT_
+/// dictionary = "ARUCO_ORIGINAL"   # a name of OpenCV's, with or without DICT_, or a file of its form, like "mine.yml"
 /// layout = "legacy"               # optional: legacy (OpenCV before 4.6) or new; found from the image otherwise
 /// ```
 ///
 /// Other keys are refused, and so is a length without a unit.
-pub fn board_from_toml(file: &str, text: &str) -> Result<CharucoBoard, Error> {
+pub fn board_from_toml(
+    file: &str,
+    text: &str,
+    beside: impl FnOnce(&str) -> Result<Vec<u8>, Error>,
+) -> Result<CharucoBoard, Error> {
     let fail = |why: String| Error::Board { file: file.to_owned(), why };
     let board: BoardFile = toml::from_str(text).map_err(|error| {
         let line = error.span().map_or(1, |span| text[..span.start].matches('\n').count() + 1);
         fail(format!("line {line}: {}; {EXAMPLE}", error.message()))
     })?;
-    let dictionary =
-        Dictionary::predefined(&board.dictionary).map_err(|error| fail(error.to_string()))?;
+    let name = &board.dictionary;
+    let dictionary = if Dictionary::is_file(name) {
+        if name.contains(['/', '\\']) {
+            return Err(fail(format!(
+                "dictionary = \"{name}\" leads elsewhere; put that file beside this one"
+            )));
+        }
+        let bytes = beside(name)?;
+        Dictionary::from_opencv_yaml(name, &String::from_utf8_lossy(&bytes))
+    } else {
+        Dictionary::predefined(name)
+    };
+    let dictionary = dictionary.map_err(|error| fail(error.to_string()))?;
     let squares = (board.squares_x, board.squares_y);
     let mut parsed = CharucoBoard::new(squares, board.square.0, board.marker.0, dictionary)
         .map_err(|error| fail(format!("{error}; {EXAMPLE}")))?;
@@ -44,14 +59,15 @@ const EXAMPLE: &str = "a board is described by squares_x = 10, squares_y = 8, sq
                        marker = \"10.4375mm\", dictionary = \"ARUCO_ORIGINAL\" and optionally layout = \"legacy\" \
                        or \"new\"";
 
-/// The same board as text for a `board.toml`.
-pub(super) fn to_toml(board: &CharucoBoard) -> String {
+/// The same board as text for a `board.toml`. A dictionary of one's own
+/// ([`to_opencv_yaml`](Dictionary::to_opencv_yaml)) has to lie beside it, under its name.
+pub fn board_to_toml(board: &CharucoBoard) -> String {
     let mut text = format!(
-        "squares_x = {}\nsquares_y = {}\nsquare = \"{}m\"\nmarker = \"{}m\"\ndictionary = \"{}\"\n",
+        "squares_x = {}\nsquares_y = {}\nsquare = \"{}\"\nmarker = \"{}\"\ndictionary = \"{}\"\n",
         board.squares_x,
         board.squares_y,
-        board.square_m,
-        board.marker_m,
+        length_text(board.square_m),
+        length_text(board.marker_m),
         board.dictionary.name()
     );
     if let Some(layout) = board.layout {
@@ -60,12 +76,16 @@ pub(super) fn to_toml(board: &CharucoBoard) -> String {
     text
 }
 
-pub(super) fn from_toml(file: &str, bytes: &[u8]) -> Result<CharucoBoard, Error> {
+pub(super) fn from_toml(
+    file: &str,
+    bytes: &[u8],
+    beside: impl FnOnce(&str) -> Result<Vec<u8>, Error>,
+) -> Result<CharucoBoard, Error> {
     let text = std::str::from_utf8(bytes).map_err(|error| Error::Board {
         file: file.to_owned(),
         why: format!("not UTF-8 text ({error}); save it as UTF-8"),
     })?;
-    board_from_toml(file, text)
+    board_from_toml(file, text, beside)
 }
 
 /// The paper's board from its `checkersize.txt`: the side of a square in centimetres, a bare number.
@@ -129,15 +149,40 @@ mod tests {
     const PAPER: &str = "squares_x = 10\nsquares_y = 8\nsquare = \"20.875mm\"\nmarker = \"10.4375 mm\"\n\
                          dictionary = \"DICT_ARUCO_ORIGINAL\"\n";
 
+    /// With nothing beside it.
+    fn read(file: &str, text: &str) -> Result<CharucoBoard, Error> {
+        board_from_toml(file, text, |name| panic!("{name} is not asked for"))
+    }
+
+    #[test]
+    fn a_dictionary_beside_it() {
+        let with = |name: &str| PAPER.replace("DICT_ARUCO_ORIGINAL", name);
+        let mine = Dictionary::predefined("ARUCO_ORIGINAL").unwrap().to_opencv_yaml();
+        let board = board_from_toml("b", &with("mine.yml"), |name| {
+            assert_eq!(name, "mine.yml");
+            Ok(mine.clone().into_bytes())
+        });
+        let board = board.unwrap();
+        assert_eq!((board.dictionary.name(), board.dictionary.len()), ("mine.yml", 1024));
+        let again = board_from_toml("b", &board_to_toml(&board), |_| Ok(mine.into_bytes()));
+        assert!(again.unwrap() == board);
+        let broken = board_from_toml("b", &with("mine.yml"), |_| Ok(b"nmarkers: 1\nx".to_vec()));
+        assert!(broken.unwrap_err().to_string().starts_with("b: mine.yml, line 2: "));
+        for name in ["../mine.yml", "/etc/mine.yml", "..\\\\mine.yml"] {
+            let message = read("b", &with(name)).unwrap_err().to_string();
+            assert!(message.contains("leads elsewhere"), "{name}: {message}");
+        }
+    }
+
     #[test]
     fn boards_read_and_write() {
-        let board = board_from_toml("b", PAPER).unwrap();
+        let board = read("b", PAPER).unwrap();
         assert!((board.square_m - 0.020875).abs() < 1e-15, "{}", board.square_m);
         assert!(board == CharucoBoard::paper(board.square_m).unwrap());
         let mut legacy = board;
         legacy.layout = Some(Layout::Legacy);
-        assert!(board_from_toml("b", &format!("{PAPER}layout = \"legacy\"")).unwrap() == legacy);
-        assert!(board_from_toml("b", &to_toml(&legacy)).unwrap() == legacy);
+        assert!(read("b", &format!("{PAPER}layout = \"legacy\"")).unwrap() == legacy);
+        assert!(read("b", &board_to_toml(&legacy)).unwrap() == legacy);
     }
 
     #[test]
@@ -165,7 +210,7 @@ mod tests {
             ("squares_x = 10", "squares_x = [", "line"),
         ] {
             let text = PAPER.replace(from, to);
-            let message = board_from_toml("my/board.toml", &text).unwrap_err().to_string();
+            let message = read("my/board.toml", &text).unwrap_err().to_string();
             assert!(
                 message.starts_with("my/board.toml: ") && message.contains(expected),
                 "{to}: {message}"

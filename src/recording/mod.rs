@@ -46,7 +46,7 @@ mod write;
 mod zeiss;
 
 pub use archive::Archive;
-pub use board_file::board_from_toml;
+pub use board_file::{board_from_toml, board_to_toml};
 #[cfg(feature = "fs")]
 pub use discover::discover;
 pub use discover::{Found, discover_in};

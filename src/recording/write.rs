@@ -1,11 +1,11 @@
 //! Recordings written in the format they are read from.
 
 use super::{
-    Error, Factory, board_file,
+    Error, Factory, board_to_toml,
     zeiss::{BOARD, CAMERA_METADATA, DEPTH_METADATA, DEPTH_UNIT_M},
 };
 use crate::{
-    board::CharucoBoard,
+    board::{CharucoBoard, Dictionary},
     image::{DepthMap, Rgb},
 };
 
@@ -57,9 +57,13 @@ impl<S: Sink> Writer<S> {
         Ok(())
     }
 
-    /// Describes the board, in `board.toml`.
+    /// Describes the board, in `board.toml`; a dictionary of one's own gets its file beside it.
     pub fn board(&mut self, board: &CharucoBoard) -> Result<(), Error> {
-        self.sink.write(BOARD, board_file::to_toml(board).as_bytes())
+        if Dictionary::is_file(board.dictionary.name()) {
+            self.sink
+                .write(board.dictionary.name(), board.dictionary.to_opencv_yaml().as_bytes())?;
+        }
+        self.sink.write(BOARD, board_to_toml(board).as_bytes())
     }
 
     /// Adds any other file, like `truth.json`.

@@ -7,6 +7,7 @@
 //! | `DepthMetadata.json` | one record per depth frame: intrinsics, distortion centre and tables |
 //! | `CameraMetadata.json` | one record per colour frame: device, field of view, distortion correction |
 //! | `board.toml`, `checkersize.txt` | the board, where somebody has described it |
+//! | `NAME.yml` | the dictionary that `board.toml` names, where it is none of OpenCV's |
 //! | `Accelerometer.txt`, `Gyroscope.txt` | not read |
 //!
 //! The app appends metadata from several threads without a lock, so their order means nothing, and a crash leaves
@@ -67,7 +68,7 @@ pub(super) fn open(
     if images.is_empty() {
         return Err(Error::NoImages { path: place });
     }
-    let read = |file: &'static str| -> Result<Option<Vec<u8>>, Error> {
+    let read = |file: &str| -> Result<Option<Vec<u8>>, Error> {
         if !names.contains(&file) {
             return Ok(None);
         }
@@ -85,7 +86,16 @@ pub(super) fn open(
         None => problems.push(Problem::MetadataMissing { file: CAMERA_METADATA }),
     }
     let board = match read(BOARD)? {
-        Some(bytes) => Some(board_file::from_toml(&join(&place, BOARD), &bytes)?),
+        Some(bytes) => {
+            let file = join(&place, BOARD);
+            let beside = |name: &str| {
+                read(name)?.ok_or_else(|| Error::Board {
+                    file: file.clone(),
+                    why: format!("its dictionary {name} is not there; put it beside board.toml"),
+                })
+            };
+            Some(board_file::from_toml(&file, &bytes, beside)?)
+        }
         None => match read(CHECKER_SIZE)? {
             Some(bytes) => {
                 Some(board_file::from_checker_size(&join(&place, CHECKER_SIZE), &bytes)?)

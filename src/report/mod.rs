@@ -4,6 +4,7 @@
 //! programs, written by [`to_json`]; [`summary`] is what a person reads in ten seconds on a terminal, as lines of
 //! [`Span`]s with a [`Tone`] each; [`page`] is one HTML file with the verdicts first and the evidence behind them,
 //! with a few of the recording's images ([`Photo`]) and what the detector saw in them ([`Overlay`]).
+//! [`sheet_pdf`], [`sheet_svg`] and [`sheet_png`] are the printed target.
 //!
 //! The page loads nothing from anywhere, and every string that came out of a file is escaped on the way into it.
 //! Nothing here judges: words, numbers and verdicts come from [`diagnose`](crate::diagnose).
@@ -29,6 +30,7 @@ mod html;
 mod json;
 mod overlay;
 mod photo;
+mod sheet;
 mod svg;
 mod text;
 pub mod wire;
@@ -42,4 +44,5 @@ pub use html::{frames_to_show, page};
 pub use json::to_json;
 pub use overlay::Overlay;
 pub use photo::Photo;
+pub use sheet::{sheet_image, sheet_pdf, sheet_png, sheet_svg};
 pub use text::{Line, Span, Tone, summary};

@@ -5,6 +5,7 @@
 mod detect;
 mod real_audit;
 mod recording;
+mod sheet;
 mod tidy;
 
 use std::{

@@ -1,6 +1,7 @@
 //! One file per verb: each parses nothing, computes nothing; it calls the library and shows what came back.
 
 mod audit;
+mod board;
 mod calibrate;
 mod completions;
 mod demo;
@@ -26,6 +27,7 @@ pub(crate) fn dispatch(args: Args, terminal: &Terminal) -> Result<Outcome, Failu
     }
     match args.command {
         Command::Audit(args) => audit::run(&args, terminal),
+        Command::Board(args) => board::run(&args, terminal),
         Command::Calibrate(args) => calibrate::run(&args, terminal),
         Command::Demo(args) => demo::run(&args, terminal),
         Command::Simulate(args) => simulate::run(&args, terminal),

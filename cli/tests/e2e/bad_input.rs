@@ -107,7 +107,7 @@ fn a_number_that_is_none() {
 
 #[test]
 fn a_board_without_a_unit() {
-    let bare = |bytes| replaced(bytes, "0.020875m", "0.020875");
+    let bare = |bytes| replaced(bytes, "20.875mm", "20.875");
     refused_after("board.toml", bare, &["board.toml", "unit"]);
     let scratch = Scratch::new();
     let recording = scratch.blank_recording("rec");
