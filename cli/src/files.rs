@@ -80,8 +80,8 @@ pub(crate) fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), Failure>
     })
 }
 
-/// New files that belong together. They replace what is there where that was asked for; else a file that is there already
-/// and holds anything else is refused before any is written.
+/// New files that belong together. They replace what is there where that was asked for; else a file that is there
+/// already and holds anything else is refused before any is written.
 pub(crate) fn write_together(
     files: &[(PathBuf, Vec<u8>)],
     replace: Replace,

@@ -39,10 +39,10 @@ fn the_detector_finds_what_is_printed() {
     for text in [
         "10x7:24mm:18mm:5X5_100",
         "10x8:20.875mm:10.4375mm:ARUCO_ORIGINAL",
-        "8x6:30mm:22mm:4X4_50",
+        "8x6:28mm:20mm:4X4_50",
         "6x8:25mm:19mm:6X6_250",
-        "8x6:30mm:24mm:7X7_1000",
-        "8x6:30mm:20mm:APRILTAG_36h11",
+        "8x6:28mm:23mm:7X7_1000",
+        "8x6:28mm:19mm:APRILTAG_36h11",
     ] {
         for layout in [Layout::Legacy, Layout::New] {
             all_corners_are_found(&text.parse().expect("a board"), layout);
@@ -59,7 +59,7 @@ fn a_dictionary_of_ones_own_is_printed_and_found() {
         Dictionary::from_opencv_yaml("tutorial_dict.yml", &yaml).expect("OpenCV reads it");
     assert_eq!((dictionary.len(), dictionary.bits()), (35, 6));
     assert_eq!(dictionary.code(34), Some(0b011111_010000_111011_111110_110101_100101));
-    let board = CharucoBoard::new((8, 6), 0.03, 0.022, dictionary).expect("a board");
+    let board = CharucoBoard::new((8, 6), 0.028, 0.021, dictionary).expect("a board");
     all_corners_are_found(&board, Layout::New);
     all_corners_are_found(&board, Layout::Legacy);
 }

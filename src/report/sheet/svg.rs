@@ -35,6 +35,10 @@ pub fn sheet_svg(sheet: &Sheet) -> String {
         }
     };
     // A line per element keeps the file readable, and diffs short.
-    let drawing = drawing.into_string().replace("><", ">\n<");
+    let drawing = drawing
+        .into_string()
+        .replace("></path>", "/>")
+        .replace("></rect>", "/>")
+        .replace("><", ">\n<");
     format!("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n{drawing}\n")
 }
