@@ -354,7 +354,9 @@ Examples:
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct DetectArgs {
-    /// Recordings, folders of PNG images, or PNG images
+    /// Recordings, folders of PNG or JPEG images, or images
+    ///
+    /// Pixels are taken as the file stores them: an orientation in the EXIF data of a JPEG is ignored.
     #[arg(required = true, value_name = "PATH")]
     pub(crate) paths: Vec<PathBuf>,
 
@@ -369,12 +371,23 @@ pub(crate) struct DetectArgs {
     /// With --threads 1 images are searched one after another and the times are those of one core.
     #[arg(long)]
     pub(crate) timings: bool,
+
+    /// Draw what was found over each image, into this folder
+    ///
+    /// One NAME.overlay.png per image, enlarged where that is small: corners with their ids in orange, markers in blue,
+    /// candidates that were not taken as magenta crosses. The folder must be new or empty, unless --force is given.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) overlay: Option<PathBuf>,
+
+    /// Let --overlay use a folder that is not empty, and replace overlays of the same names
+    #[arg(long, requires = "overlay")]
+    pub(crate) force: bool,
 }
 
 const DETECT_EXAMPLES: &str = "\
 Examples:
   truedepth detect my-recording
-  truedepth detect photo.png --board 7x5:30mm:21mm:4X4_50
+  truedepth detect photo.jpg --board 7x5:30mm:21mm:4X4_50 --overlay seen
   truedepth detect my-recording --json --timings --threads 1 > corners.json";
 
 #[derive(Debug, clap::Args)]

@@ -1,6 +1,7 @@
 //! Files that leave: never over somebody else's, never half written.
 
 use std::{
+    collections::HashSet,
     fs,
     path::{Path, PathBuf},
     process,
@@ -10,6 +11,9 @@ use crate::failure::Failure;
 
 const JSON: &str = "report.json";
 const HTML: &str = "report.html";
+
+/// How pictures of what was found end.
+pub(crate) const OVERLAY: &str = ".overlay.png";
 
 /// Every `report.json` of ours says so in its `schema`.
 const SCHEMA: &str = "truedepth.";
@@ -56,6 +60,55 @@ impl ReportFolder {
         write_atomically(&self.path.join(JSON), json.as_bytes())?;
         write_atomically(&self.path.join(HTML), html.as_bytes())
     }
+}
+
+/// A folder that takes pictures of what was found, one per image.
+#[derive(Debug)]
+pub(crate) struct OverlayFolder {
+    path: PathBuf,
+    /// Names given out, in lower case: not every file system tells `A` from `a`.
+    taken: HashSet<String>,
+}
+
+impl OverlayFolder {
+    /// Makes the folder. Refuses one with anything in it unless `overwrite` says that files of the same names may go.
+    pub(crate) fn new(path: &Path, overwrite: Overwrite) -> Result<Self, Failure> {
+        let shown = path.display();
+        let unusable = |e| {
+            Failure::from(e)
+                .within(format!("cannot use the folder {shown}"))
+                .hint("name a folder that can be written with --overlay")
+        };
+        if path.exists() && !path.is_dir() {
+            let message = format!("{shown} is a file, not a folder for pictures");
+            return Err(Failure::new(message).hint("name a new folder with --overlay"));
+        }
+        fs::create_dir_all(path).map_err(unusable)?;
+        if overwrite == Overwrite::No && fs::read_dir(path).map_err(unusable)?.next().is_some() {
+            let message = format!("{shown} is not empty; nothing was written");
+            return Err(Failure::new(message)
+                .hint("name a new folder with --overlay, or allow this one with --force"));
+        }
+        Ok(Self { path: path.to_owned(), taken: HashSet::new() })
+    }
+
+    /// Where the picture of an image goes: NAME.overlay.png, with a number where that was given out before. The order
+    /// of the images decides, not what lies in the folder. No photo has such a name, so that none is written over.
+    pub(crate) fn place(&mut self, image: &Path) -> PathBuf {
+        let stem = image.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let name = (1_usize..)
+            .map(|n| if n == 1 { stem.clone() } else { format!("{stem}-{n}") })
+            .find(|name| self.taken.insert(name.to_lowercase()))
+            .expect("there are more numbers than images");
+        self.path.join(format!("{name}{OVERLAY}"))
+    }
+}
+
+/// Whether files of the same names may go.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Overwrite {
+    No,
+    Yes,
 }
 
 /// True for a `report.json` that says it is one of ours.
@@ -190,6 +243,27 @@ mod tests {
         assert!(report("three").is_err(), "a report.html that may be anyone's");
         assert_eq!(fs::read_to_string(dir.join(HTML)).unwrap(), "two");
         assert!(ReportFolder::new(&dir.join(HTML)).is_err(), "a file");
+    }
+
+    #[test]
+    fn pictures_get_names_of_their_own_and_never_replace_anything_unasked() {
+        let scratch = Scratch::new("overlay");
+        let dir = scratch.0.join("deep/er");
+        let mut folder = OverlayFolder::new(&dir, Overwrite::No).unwrap();
+        for (image, expected) in [
+            ("a/rgb.png", "rgb.overlay.png"),
+            ("b/rgb.jpg", "rgb-2.overlay.png"),
+            ("b/RGB.jpg", "RGB-3.overlay.png"),
+            ("rgb-2.png", "rgb-2-2.overlay.png"),
+            ("rgb.v2.png", "rgb.v2.overlay.png"),
+        ] {
+            assert_eq!(folder.place(Path::new(image)), dir.join(expected), "{image}");
+        }
+        OverlayFolder::new(&dir, Overwrite::No).unwrap();
+        fs::write(dir.join("mine"), "").unwrap();
+        assert!(OverlayFolder::new(&dir, Overwrite::No).is_err());
+        assert!(OverlayFolder::new(&dir, Overwrite::Yes).is_ok());
+        assert!(OverlayFolder::new(&dir.join("mine"), Overwrite::Yes).is_err(), "a file");
     }
 
     #[test]

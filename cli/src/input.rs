@@ -16,6 +16,7 @@ use truedepth::{
 use crate::{
     args::{BoardArgs, BoardArgument, InputArgs},
     failure::Failure,
+    files::OVERLAY,
 };
 
 /// What a file may ask for.
@@ -41,49 +42,49 @@ pub(crate) fn recordings(path: &Path, args: &InputArgs) -> Result<Vec<Found>, Fa
 pub(crate) enum Input {
     /// The recordings in a folder or archive.
     Recordings(Vec<Found>),
-    /// PNG images, by name.
+    /// Images, by name.
     Images(Vec<PathBuf>),
 }
 
 impl Input {
-    /// A folder is the recordings in it, or else its PNG images; a file is an image or an archive by its extension.
+    /// A folder is the recordings in it, or else its PNG and JPEG images; a file is an archive by its first bytes, or
+    /// else an image, whatever its name.
     pub(crate) fn at(path: &Path, args: &InputArgs) -> Result<Self, Failure> {
-        if is_png(path) && path.is_file() {
-            return Ok(Self::Images(vec![path.to_owned()]));
-        }
         match recording::discover(path, &limits(args)) {
             Ok(found) => Ok(Self::Recordings(found)),
             Err(recording::Error::NotARecording { .. }) if path.is_dir() => {
                 let images = images_in(path)?;
                 if images.is_empty() {
-                    let message =
-                        format!("{} holds neither a recording nor a PNG image", path.display());
-                    return Err(Failure::new(message).hint("name a folder that does, or an image"));
+                    let shown = path.display();
+                    return Err(Failure::new(format!(
+                        "{shown} holds neither a recording nor a PNG or JPEG image"
+                    ))
+                    .hint("name a folder that does, or an image"));
                 }
                 Ok(Self::Images(images))
             }
-            Err(recording::Error::NotARecording { .. }) => {
-                let message =
-                    format!("{} is neither a PNG image nor a zip archive", path.display());
-                Err(Failure::new(message)
-                    .hint("images of other formats have to be converted to PNG first"))
+            Err(recording::Error::NotARecording { .. })
+                if path.is_file() && !has_extension(path, &["zip"]) =>
+            {
+                Ok(Self::Images(vec![path.to_owned()]))
             }
             Err(e) => Err(e.into()),
         }
     }
 }
 
-fn is_png(path: &Path) -> bool {
-    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"))
+fn has_extension(path: &Path, extensions: &[&str]) -> bool {
+    path.extension().is_some_and(|own| extensions.iter().any(|one| own.eq_ignore_ascii_case(one)))
 }
 
-/// The PNG images of a folder, by name; folders inside are not looked into.
+/// The images of a folder, by name; folders inside are not looked into, and our own overlays are passed over.
 fn images_in(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
     let unreadable = |e| Failure::from(e).within(format!("cannot look into {}", folder.display()));
     let mut images = Vec::new();
     for entry in fs::read_dir(folder).map_err(unreadable)? {
         let path = entry.map_err(unreadable)?.path();
-        if is_png(&path) && path.is_file() {
+        let overlay = path.to_string_lossy().ends_with(OVERLAY);
+        if has_extension(&path, &["png", "jpg", "jpeg"]) && !overlay && path.is_file() {
             images.push(path);
         }
     }

@@ -1,8 +1,8 @@
-//! PNG bytes to images and back.
+//! PNG and JPEG bytes to images, and images to PNG.
 
 use std::io::{Cursor, ErrorKind};
 
-use super::{DepthMap, Gray, Rgb, rgb::luma, unfiltered};
+use super::{DepthMap, Gray, Rgb, jpeg, rgb::luma, unfiltered};
 
 /// What an untrusted image may ask for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,8 +23,13 @@ impl Default for Limits {
 #[non_exhaustive]
 pub enum Error {
     /// The bytes end early, fail a checksum or break the format.
-    #[error("damaged or truncated PNG ({0}): copy the file again from where it came")]
-    Damaged(String),
+    #[error("damaged or truncated {format} ({reason}): copy the file again from where it came")]
+    Damaged {
+        /// `PNG` or `JPEG`.
+        format: &'static str,
+        /// What the decoder met.
+        reason: String,
+    },
     /// A kind of image that is not used here.
     #[error("{0}")]
     Unsupported(String),
@@ -40,7 +45,73 @@ pub enum Error {
     },
 }
 
+/// What the first bytes of a file say it is.
+enum Format {
+    Png,
+    Jpeg,
+}
+
+impl Format {
+    fn of(bytes: &[u8]) -> Result<Self, Error> {
+        if bytes.starts_with(b"\x89PNG") {
+            return Ok(Self::Png);
+        }
+        if bytes.starts_with(b"\xff\xd8") {
+            return Ok(Self::Jpeg);
+        }
+        let after = |n: usize| bytes.get(n..).unwrap_or_default();
+        let brand = after(4).strip_prefix(b"ftyp").and_then(|rest| rest.get(..4));
+        let found = match (bytes, brand) {
+            (b"", _) => {
+                let message = "the file is empty: copy it again from where it came";
+                return Err(Error::Unsupported(message.into()));
+            }
+            (_, Some(b"heic" | b"heix" | b"heim" | b"heis" | b"hevc" | b"mif1" | b"msf1")) => {
+                "a HEIC image"
+            }
+            (_, Some(b"avif" | b"avis")) => "an AVIF image",
+            (_, Some(_)) => "a video",
+            ([b'B', b'M', ..], _) => "a BMP image",
+            ([b'G', b'I', b'F', b'8', ..], _) => "a GIF image",
+            ([b'I', b'I', b'*' | b'+', 0, ..] | [b'M', b'M', 0, b'*' | b'+', ..], _) => {
+                "a TIFF or raw image"
+            }
+            ([b'P', b'1'..=b'7', b'\n' | b' ' | b'\r', ..], _) => "a PNM image",
+            ([b'%', b'P', b'D', b'F', ..], _) => "a PDF",
+            ([b'P', b'K', 3 | 5, ..], _) => "a zip archive",
+            ([0xff, 0x0a, ..] | [0, 0, 0, 12, b'J', b'X', b'L', b' ', ..], _) => "a JPEG XL image",
+            ([0, 0, 0, 12, b'j', b'P', b' ', b' ', ..] | [0xff, 0x4f, 0xff, 0x51, ..], _) => {
+                "a JPEG 2000 image"
+            }
+            _ if bytes.starts_with(b"RIFF") && after(8).starts_with(b"WEBP") => "a WebP image",
+            _ => "no image that is known here",
+        };
+        Err(Error::Unsupported(format!(
+            "neither PNG nor JPEG but {found}: convert it to PNG, which keeps every pixel"
+        )))
+    }
+}
+
 impl Gray {
+    /// Decodes a PNG as [`from_png`](Self::from_png) or a JPEG as [`from_jpeg`](Self::from_jpeg), whichever its first
+    /// bytes say it is. Other kinds of files are [`Error::Unsupported`], with their name where it is known.
+    pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Self, Error> {
+        match Format::of(bytes)? {
+            Format::Png => Self::from_png(bytes, limits),
+            Format::Jpeg => Self::from_jpeg(bytes, limits),
+        }
+    }
+
+    /// Decodes an 8-bit grey or colour JPEG, baseline or progressive. A colour image's luma channel is taken as it is
+    /// stored, which differs from [`Rgb::to_gray`] of its colours by rounding and where colours were cut to 0 to 255.
+    ///
+    /// The orientation that EXIF data may ask for is ignored: pixels stay where the sensor has them, and so do the
+    /// camera's intrinsics. JPEG has no checksums: of damage only what breaks the coding is seen.
+    pub fn from_jpeg(bytes: &[u8], limits: &Limits) -> Result<Self, Error> {
+        let (width, height, pixels) = jpeg::gray(bytes, limits)?;
+        Ok(Self::new(width, height, pixels))
+    }
+
     /// Decodes a PNG of any colour type and bit depth to grey: colours by their luma as [`Rgb::to_gray`], 16 bits by
     /// their higher byte, alpha dropped. Checksums are verified to the last byte.
     pub fn from_png(bytes: &[u8], limits: &Limits) -> Result<Self, Error> {
@@ -89,6 +160,22 @@ impl Gray {
 }
 
 impl Rgb {
+    /// Decodes a PNG as [`from_png`](Self::from_png) or a JPEG as [`from_jpeg`](Self::from_jpeg), whichever its first
+    /// bytes say it is. Other kinds of files are [`Error::Unsupported`], with their name where it is known.
+    pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Self, Error> {
+        match Format::of(bytes)? {
+            Format::Png => Self::from_png(bytes, limits),
+            Format::Jpeg => Self::from_jpeg(bytes, limits),
+        }
+    }
+
+    /// Decodes an 8-bit grey or colour JPEG, baseline or progressive; grey becomes three equal channels. Orientation
+    /// and damage as for [`Gray::from_jpeg`].
+    pub fn from_jpeg(bytes: &[u8], limits: &Limits) -> Result<Self, Error> {
+        let (width, height, pixels) = jpeg::rgb(bytes, limits)?;
+        Ok(Self::new(width, height, pixels))
+    }
+
     /// Decodes a PNG of any colour type and bit depth: grey becomes three equal channels, 16 bits their higher byte,
     /// alpha is dropped. Checksums are verified to the last byte.
     pub fn from_png(bytes: &[u8], limits: &Limits) -> Result<Self, Error> {
@@ -226,7 +313,7 @@ fn decode<T: Clone>(
     }
     reader.finish().map_err(damaged)?;
     if pixels.len() != n {
-        return Err(Error::Damaged(format!("{} of {n} pixels", pixels.len())));
+        return Err(broken(format!("{} of {n} pixels", pixels.len())));
     }
     Ok((width, height, pixels))
 }
@@ -238,15 +325,19 @@ fn not_depth(kind: &str) -> Error {
     ))
 }
 
+fn broken(reason: String) -> Error {
+    Error::Damaged { format: "PNG", reason }
+}
+
 fn damaged(error: png::DecodingError) -> Error {
     match error {
         png::DecodingError::IoError(e) if e.kind() == ErrorKind::UnexpectedEof => {
-            Error::Damaged("the data end early".into())
+            broken("the data end early".into())
         }
         png::DecodingError::LimitsExceeded => {
             Error::Unsupported("a row or chunk of this PNG asks for more than 64 MiB".into())
         }
-        other => Error::Damaged(other.to_string()),
+        other => broken(other.to_string()),
     }
 }
 
@@ -448,7 +539,7 @@ mod tests {
         let whole = Rgb::new(20, 9, noise(20 * 9 * 3).as_chunks::<3>().0.to_vec()).to_png();
         for n in 0..whole.len() {
             let error = Rgb::from_png(&whole[..n], &Limits::default()).unwrap_err();
-            assert!(matches!(error, Error::Damaged(_)), "{n} bytes: {error}");
+            assert!(matches!(error, Error::Damaged { .. }), "{n} bytes: {error}");
         }
         // Every byte stands under some checksum or is checked itself.
         for i in 0..whole.len() {
@@ -499,6 +590,39 @@ mod tests {
         for bytes in [gray, rgb] {
             let error = DepthMap::from_png(&bytes, 1e-4, &Limits::default()).unwrap_err();
             assert!(error.to_string().contains("16-bit grey"), "{error}");
+        }
+    }
+
+    #[test]
+    fn the_first_bytes_tell_the_format_whatever_the_name() {
+        let image = Gray::new(3, 2, vec![7; 6]);
+        assert_eq!(Gray::decode(&image.to_png(), &Limits::default()), Ok(image));
+        for (bytes, name) in [
+            (b"".as_slice(), "empty"),
+            (b"\0\0\0\x28ftypheic\0\0\0\0", "HEIC"),
+            (b"\0\0\0\x20ftypmif1\0\0\0\0", "HEIC"),
+            (b"\0\0\0\x20ftypavif", "AVIF"),
+            (b"\0\0\0\x14ftypqt  ", "video"),
+            (b"BM\x36\x10", "BMP"),
+            (b"GIF89a", "GIF"),
+            (b"II*\0\x08\0\0\0", "TIFF"),
+            (b"MM\0*\0\0\0\x08", "TIFF"),
+            (b"P5\n3 2\n255\n", "PNM"),
+            (b"RIFF\x24\0\0\0WEBPVP8 ", "WebP"),
+            (b"RIFF\x24\0\0\0AVI LIST", "no image"),
+            (b"\xff\x0a\xfa\x3f", "JPEG XL"),
+            (b"PK\x03\x04", "zip"),
+            (b"%PDF-1.7", "PDF"),
+            (b"hello", "no image"),
+            (b"P", "no image"),
+        ] {
+            for error in [
+                Gray::decode(bytes, &Limits::default()).unwrap_err(),
+                Rgb::decode(bytes, &Limits::default()).unwrap_err(),
+            ] {
+                assert!(matches!(error, Error::Unsupported(_)), "{name}: {error}");
+                assert!(error.to_string().contains(name), "{name}: {error}");
+            }
         }
     }
 }

@@ -8,6 +8,7 @@
 mod codec;
 mod depth_map;
 mod gray;
+mod jpeg;
 mod rgb;
 mod unfiltered;
 

@@ -81,26 +81,53 @@ impl Overlay {
     }
 
     /// Drawn into a copy of the image: markers blue, lattice and corners orange with their ids, rejects magenta.
+    ///
+    /// Small images are enlarged by a whole factor, up to four, to at least 1280 columns where that suffices, because
+    /// an id needs more pixels than a small image has between its corners.
     pub fn draw(&self, image: &Rgb) -> Rgb {
-        let mut canvas = Canvas::new(image);
-        let unit = (image.width() as f64 / 640.0).max(1.0);
+        let factor = (1280 / image.width().max(1)).clamp(1, 4);
+        let mut canvas = Canvas::new(image, factor);
+        let unit = ((image.width() * factor) as f64 / 1280.0).max(1.0);
+        // Integers are pixel centres in the small image and in the large one.
+        let k = factor as f64;
+        let large = |p: Pixel| Pixel::new((p.x + 0.5) * k - 0.5, (p.y + 0.5) * k - 0.5);
         for marker in &self.markers {
+            let marker = marker.map(large);
             for side in 0..4 {
-                canvas.line(marker[side], marker[(side + 1) % 4], unit, MARKER);
+                canvas.line(marker[side], marker[(side + 1) % 4], 2.0 * unit, MARKER);
             }
         }
-        for &[from, to] in &self.lattice {
-            canvas.line(from, to, 0.7 * unit, CORNER);
+        let radius = 6.0 * unit;
+        for &segment in &self.lattice {
+            let [from, to] = segment.map(large);
+            // Up to the rings, so that the corner itself stays visible in them.
+            let [dx, dy] = to - from;
+            let length = dx.hypot(dy);
+            if length > 2.0 * radius {
+                let (x, y) = (dx * radius / length, dy * radius / length);
+                let ends = (Pixel::new(from.x + x, from.y + y), Pixel::new(to.x - x, to.y - y));
+                canvas.line(ends.0, ends.1, unit, CORNER);
+            }
         }
-        for &Pixel { x, y } in &self.rejects {
-            let r = 3.0 * unit;
-            canvas.line(Pixel::new(x - r, y - r), Pixel::new(x + r, y + r), unit, REJECT);
-            canvas.line(Pixel::new(x - r, y + r), Pixel::new(x + r, y - r), unit, REJECT);
+        for Pixel { x, y } in self.rejects.iter().copied().map(large) {
+            let r = 5.0 * unit;
+            canvas.line(Pixel::new(x - r, y - r), Pixel::new(x + r, y + r), 1.6 * unit, REJECT);
+            canvas.line(Pixel::new(x - r, y + r), Pixel::new(x + r, y - r), 1.6 * unit, REJECT);
         }
+        for &(_, pixel) in &self.corners {
+            canvas.ring(large(pixel), radius, 1.8 * unit, CORNER);
+        }
+        let cell = (2.0 * unit).round() as i64;
         for &(id, pixel) in &self.corners {
-            canvas.ring(pixel, 3.5 * unit, unit, CORNER);
-            let at = Pixel::new(pixel.x + 5.0 * unit, pixel.y - 11.0 * unit);
-            canvas.number(id, at, unit.round().max(1.0) as i64, CORNER);
+            let Pixel { x, y } = large(pixel);
+            let digits = id.to_string().len() as i64;
+            let (x, y) = (x + 0.9 * radius, y - 0.9 * radius);
+            let at = (x.round() as i64 + cell / 2, y.round() as i64 - 5 * cell);
+            // Squares are black and white: on a plate of its own the id can be read on both.
+            let margin = cell / 2 + 1;
+            let plate = ((4 * digits - 1) * cell + 2 * margin, 5 * cell + 2 * margin);
+            canvas.fill((at.0 - margin, at.1 - margin), plate, PLATE);
+            canvas.number(id, at, cell, ID);
         }
         canvas.finish()
     }
@@ -167,6 +194,8 @@ fn crosses(at: &[Pixel], radius: f64) -> String {
 const CORNER: [u8; 3] = [230, 97, 0];
 const MARKER: [u8; 3] = [0, 114, 178];
 const REJECT: [u8; 3] = [204, 60, 150];
+const PLATE: [u8; 3] = [40, 24, 8];
+const ID: [u8; 3] = [255, 200, 120];
 
 /// An image to draw into, with coverage blending.
 struct Canvas {
@@ -176,8 +205,28 @@ struct Canvas {
 }
 
 impl Canvas {
-    fn new(image: &Rgb) -> Self {
-        Self { width: image.width(), height: image.height(), pixels: image.pixels().to_vec() }
+    /// The image, enlarged by bilinear interpolation.
+    fn new(image: &Rgb, factor: usize) -> Self {
+        let (width, height) = (image.width() * factor, image.height() * factor);
+        let source = |at: usize, size: usize| {
+            let at = ((at as f64 + 0.5) / factor as f64 - 0.5).clamp(0.0, size as f64 - 1.0);
+            (at as usize, (at as usize + 1).min(size - 1), at.fract())
+        };
+        let mut pixels = Vec::with_capacity(width * height);
+        for y in 0..height {
+            let (y0, y1, fy) = source(y, image.height());
+            for x in 0..width {
+                let (x0, x1, fx) = source(x, image.width());
+                let at = |x: usize, y: usize| image.pixels()[y * image.width() + x].map(f64::from);
+                let (a, b, c, d) = (at(x0, y0), at(x1, y0), at(x0, y1), at(x1, y1));
+                pixels.push([0, 1, 2].map(|i| {
+                    let top = a[i] + fx * (b[i] - a[i]);
+                    let bottom = c[i] + fx * (d[i] - c[i]);
+                    (top + fy * (bottom - top)).round() as u8
+                }));
+            }
+        }
+        Self { width, height, pixels }
     }
 
     fn finish(self) -> Rgb {
@@ -230,7 +279,7 @@ impl Canvas {
     }
 
     /// Digits of 3x5 cells, `cell` pixels each, their top left corner at `at`.
-    fn number(&mut self, number: usize, at: Pixel, cell: i64, color: [u8; 3]) {
+    fn number(&mut self, number: usize, at: (i64, i64), cell: i64, color: [u8; 3]) {
         for (index, digit) in number.to_string().bytes().enumerate() {
             let rows = DIGITS[usize::from(digit - b'0')];
             for (row, bits) in rows.into_iter().enumerate() {
@@ -238,17 +287,17 @@ impl Canvas {
                     if bits >> (2 - column) & 1 == 0 {
                         continue;
                     }
-                    let x = at.x.round() as i64 + (index as i64 * 4 + column) * cell;
-                    let y = at.y.round() as i64 + row as i64 * cell;
-                    self.fill(x, y, cell, color);
+                    let x = at.0 + (index as i64 * 4 + column) * cell;
+                    let y = at.1 + row as i64 * cell;
+                    self.fill((x, y), (cell, cell), color);
                 }
             }
         }
     }
 
-    fn fill(&mut self, x: i64, y: i64, size: i64, color: [u8; 3]) {
-        for y in y.max(0)..(y + size).min(self.height as i64) {
-            for x in x.max(0)..(x + size).min(self.width as i64) {
+    fn fill(&mut self, (x, y): (i64, i64), (width, height): (i64, i64), color: [u8; 3]) {
+        for y in y.max(0)..(y + height).min(self.height as i64) {
+            for x in x.max(0)..(x + width).min(self.width as i64) {
                 self.pixels[y as usize * self.width + x as usize] = color;
             }
         }
@@ -325,11 +374,28 @@ mod tests {
         let mut overlay = Overlay::new(&observation(&board, 63), &board, (320, 240));
         overlay.rejects.push(Pixel::new(-50.0, 1e9));
         let drawn = overlay.draw(&gray);
-        let at = |x: usize, y: usize| drawn.pixels()[y * 320 + x];
-        // A lattice line of 0.7 pixels covers its own row by 0.85: half of 0.7 and half of the pixel.
-        assert_eq!(at(40, 40), [215, 102, 19]);
-        assert_eq!(at(25, 30), MARKER);
-        assert_eq!(at(300, 230), [128; 3]);
-        assert_eq!(Overlay::default().draw(&gray), gray);
+        // Four times as large.
+        assert_eq!((drawn.width(), drawn.height()), (1280, 960));
+        let at = |x: usize, y: usize| drawn.pixels()[y * 1280 + x];
+        // Corner 0 at (30, 40) lies at (121.5, 161.5): untouched itself, with a ring of radius 6 around it.
+        assert_eq!(at(121, 161), [128; 3]);
+        assert_eq!(at(121, 167), CORNER);
+        // Halfway to corner 1 the lattice's line, one pixel wide, covers half of each of two rows.
+        assert_eq!([at(161, 161), at(161, 162)], [[179, 113, 64]; 2]);
+        // The id right above: a plate with a zero in it.
+        assert_eq!(at(128, 146), ID);
+        assert_eq!(at(130, 148), PLATE);
+        // The first marker's left edge at 15 lies at 61.5.
+        assert_eq!([at(61, 120), at(62, 120)], [MARKER; 2]);
+        assert_eq!(at(1200, 920), [128; 3]);
+
+        let nothing = Overlay::default();
+        let large = Rgb::new(1280, 2, vec![[9, 8, 7]; 2560]);
+        assert_eq!(nothing.draw(&large), large, "large enough as it is");
+        let two = Rgb::new(2, 1, vec![[0, 0, 0], [200, 100, 40]]);
+        let row: Vec<u8> = nothing.draw(&two).pixels()[..8].iter().map(|p| p[0]).collect();
+        assert_eq!(row, [0, 0, 25, 75, 125, 175, 200, 200]);
+        let empty = Rgb::new(0, 0, Vec::new());
+        assert_eq!(nothing.draw(&empty), empty);
     }
 }

@@ -3,6 +3,7 @@
 //! Tests on real recordings ask [`data`] for them and end early, saying so, where the folder is absent.
 
 mod detect;
+mod photos;
 mod real_audit;
 mod recording;
 mod sheet;

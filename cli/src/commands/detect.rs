@@ -1,15 +1,18 @@
 //! `truedepth detect PATH...`
 
-use std::{path::Path, time::Instant};
+use std::{
+    path::{Path, PathBuf},
+    time::Instant,
+};
 
 use rayon::prelude::*;
 use truedepth::{
     board::CharucoBoard,
     detect::Detector,
-    image::Gray,
+    image::{Gray, Rgb},
     recording::Recording,
     report::{
-        self,
+        self, Overlay,
         wire::{self, DetectedImage},
     },
 };
@@ -17,6 +20,7 @@ use truedepth::{
 use crate::{
     args::DetectArgs,
     failure::Failure,
+    files::{OverlayFolder, Overwrite, write_atomically},
     input::{self, Input},
     outcome::Outcome,
     terminal::Terminal,
@@ -24,10 +28,14 @@ use crate::{
 
 pub(crate) fn run(args: &DetectArgs, terminal: &Terminal) -> Result<Outcome, Failure> {
     let board = input::board(&args.input.board)?;
+    let overwrite = if args.force { Overwrite::Yes } else { Overwrite::No };
+    let folder = args.overlay.as_deref().map(|path| OverlayFolder::new(path, overwrite));
+    let mut search =
+        Search { board: board.as_ref(), args, terminal, overlays: folder.transpose()? };
     let mut images = Vec::new();
     let mut outcome = Outcome::Clean;
     for path in &args.paths {
-        match searched(path, board.as_ref(), args, terminal) {
+        match search.path(path) {
             Ok(found) => {
                 for image in found {
                     match image {
@@ -46,6 +54,9 @@ pub(crate) fn run(args: &DetectArgs, terminal: &Terminal) -> Result<Outcome, Fai
             }
         }
     }
+    if let (Some(folder), false) = (&args.overlay, images.is_empty()) {
+        terminal.say(&format!("overlays: {}", folder.display()));
+    }
     if args.json.json {
         let document = wire::Document::Detect(wire::Detect { images });
         terminal.result(&report::to_json(&document))?;
@@ -57,98 +68,165 @@ pub(crate) fn run(args: &DetectArgs, terminal: &Terminal) -> Result<Outcome, Fai
 
 type Searched = Vec<Result<DetectedImage, Failure>>;
 
-/// All images at a path, searched, in order.
-fn searched(
-    path: &Path,
-    board: Option<&CharucoBoard>,
-    args: &DetectArgs,
-    terminal: &Terminal,
-) -> Result<Searched, Failure> {
-    let unknown = |what: &str| {
-        Failure::new(format!("{what}: the board is not known"))
-            .hint("say which with --board, like --board 10x8:20.875mm:10.4375mm:ARUCO_ORIGINAL")
-    };
-    match Input::at(path, &args.input)? {
-        Input::Recordings(found) => {
-            let mut all = Vec::new();
-            for found in found {
-                let recording = found.open()?;
-                let board =
-                    board.or(recording.board.as_ref()).ok_or_else(|| unknown(recording.place()))?;
-                all.extend(in_recording(&recording, board, args, terminal));
+/// What is the same for all paths.
+struct Search<'a> {
+    board: Option<&'a CharucoBoard>,
+    args: &'a DetectArgs,
+    terminal: &'a Terminal,
+    overlays: Option<OverlayFolder>,
+}
+
+impl Search<'_> {
+    /// All images at a path, searched, in order.
+    fn path(&mut self, path: &Path) -> Result<Searched, Failure> {
+        let unknown = |what: &str| {
+            Failure::new(format!("{what}: the board is not known"))
+                .hint("say which with --board, like --board 10x8:20.875mm:10.4375mm:ARUCO_ORIGINAL")
+        };
+        match Input::at(path, &self.args.input)? {
+            Input::Recordings(found) => {
+                let mut all = Vec::new();
+                for found in found {
+                    let recording = found.open()?;
+                    let board = self
+                        .board
+                        .or(recording.board.as_ref())
+                        .ok_or_else(|| unknown(recording.place()))?;
+                    all.extend(self.recording(&recording, board));
+                }
+                Ok(all)
             }
-            Ok(all)
+            Input::Images(files) => {
+                let shown = path.display().to_string();
+                let board = self.board.ok_or_else(|| unknown(&shown))?;
+                Ok(self.images(&shown, files, board))
+            }
         }
-        Input::Images(files) => {
-            let board = board.ok_or_else(|| unknown(&path.display().to_string()))?;
-            let detector = Detector::new(board);
-            let bar = terminal.progress(&path.display().to_string(), files.len());
-            let found = files
-                .par_iter()
-                .map(|file| {
-                    let image = timed(&file.display().to_string(), &detector, args, || {
-                        let bytes = input::read(file)?;
-                        Gray::from_png(&bytes, &input::limits(&args.input).image).map_err(|e| {
-                            Failure::from(e).within(format!("cannot read {}", file.display()))
-                        })
-                    });
-                    bar.inc(1);
-                    image
+    }
+
+    /// Images of their own.
+    fn images(&mut self, shown: &str, files: Vec<PathBuf>, board: &CharucoBoard) -> Searched {
+        let limits = input::limits(&self.args.input).image;
+        let images = files
+            .into_iter()
+            .map(|file| Image {
+                shown: file.display().to_string(),
+                overlay: self.overlays.as_mut().map(|folder| folder.place(&file)),
+                source: file,
+            })
+            .collect();
+        let decoded = |file: &Path, image: Result<_, truedepth::image::Error>| {
+            image.map_err(|e| Failure::from(e).within(format!("cannot read {}", file.display())))
+        };
+        self.all(
+            shown,
+            images,
+            board,
+            &Decode {
+                gray: |file: &PathBuf| decoded(file, Gray::decode(&input::read(file)?, &limits)),
+                rgb: |file: &PathBuf| {
+                    let bytes = input::read(file)?;
+                    Rgb::decode(&bytes, &limits).map_err(Failure::from)
+                },
+            },
+        )
+    }
+
+    /// The colour images of a recording, in order of time.
+    fn recording(&mut self, recording: &Recording, board: &CharucoBoard) -> Searched {
+        let frames = recording.frames.iter().enumerate();
+        let images = frames
+            .filter_map(|(index, frame)| {
+                let name = Path::new(frame.color.as_ref()?);
+                let short = name.file_name().unwrap_or_default().to_string_lossy();
+                let picture = format!("{}-{short}", recording.name);
+                Some(Image {
+                    shown: Path::new(recording.place()).join(name).display().to_string(),
+                    overlay: self.overlays.as_mut().map(|f| f.place(Path::new(&picture))),
+                    source: index,
                 })
-                .collect();
-            bar.finish_and_clear();
-            Ok(found)
+            })
+            .collect();
+        self.all(
+            &recording.name,
+            images,
+            board,
+            &Decode {
+                gray: |&index: &usize| Ok(recording.gray(index)?),
+                rgb: |&index: &usize| Ok(recording.rgb(index)?),
+            },
+        )
+    }
+
+    fn all<S, G, R>(
+        &self,
+        what: &str,
+        images: Vec<Image<S>>,
+        board: &CharucoBoard,
+        decode: &Decode<G, R>,
+    ) -> Searched
+    where
+        S: Sync,
+        G: Fn(&S) -> Result<Gray, Failure> + Sync,
+        R: Fn(&S) -> Result<Rgb, Failure> + Sync,
+    {
+        let detector = Detector::new(board);
+        let bar = self.terminal.progress(what, images.len());
+        let found = images
+            .par_iter()
+            .map(|image| {
+                let found = self.one(image, &detector, decode);
+                bar.inc(1);
+                found
+            })
+            .collect();
+        bar.finish_and_clear();
+        found
+    }
+
+    /// Decodes and searches one image, looks at the clock, and draws.
+    fn one<S, G, R>(
+        &self,
+        image: &Image<S>,
+        detector: &Detector,
+        decode: &Decode<G, R>,
+    ) -> Result<DetectedImage, Failure>
+    where
+        G: Fn(&S) -> Result<Gray, Failure>,
+        R: Fn(&S) -> Result<Rgb, Failure>,
+    {
+        let start = Instant::now();
+        let gray = (decode.gray)(&image.source)?;
+        let decoded = Instant::now();
+        let observation = detector.detect(&gray);
+        let detected = Instant::now();
+        let size = (gray.width(), gray.height());
+        let mut found = DetectedImage::new(image.shown.clone(), size.into(), &observation);
+        if self.args.timings {
+            found.decode_ms = Some(1e3 * (decoded - start).as_secs_f64());
+            found.detect_ms = Some(1e3 * (detected - decoded).as_secs_f64());
         }
+        if let Some(path) = &image.overlay {
+            let overlay = Overlay::new(&observation, detector.board(), size);
+            write_atomically(path, &overlay.draw(&(decode.rgb)(&image.source)?).to_png())?;
+        }
+        Ok(found)
     }
 }
 
-/// The colour images of a recording, searched, in order of time.
-fn in_recording(
-    recording: &Recording,
-    board: &CharucoBoard,
-    args: &DetectArgs,
-    terminal: &Terminal,
-) -> Searched {
-    let detector = Detector::new(board);
-    let frames: Vec<(usize, &String)> = recording
-        .frames
-        .iter()
-        .enumerate()
-        .filter_map(|(index, frame)| Some((index, frame.color.as_ref()?)))
-        .collect();
-    let bar = terminal.progress(&recording.name, frames.len());
-    let found = frames
-        .par_iter()
-        .map(|(index, name)| {
-            let shown = Path::new(recording.place()).join(name).display().to_string();
-            let image = timed(&shown, &detector, args, || Ok(recording.gray(*index)?));
-            bar.inc(1);
-            image
-        })
-        .collect();
-    bar.finish_and_clear();
-    found
+/// One image to search.
+struct Image<S> {
+    /// As the output names it.
+    shown: String,
+    source: S,
+    /// Where to draw what was found.
+    overlay: Option<PathBuf>,
 }
 
-/// Decodes and searches one image, and looks at the clock.
-fn timed(
-    shown: &str,
-    detector: &Detector,
-    args: &DetectArgs,
-    decode: impl FnOnce() -> Result<Gray, Failure>,
-) -> Result<DetectedImage, Failure> {
-    let start = Instant::now();
-    let image = decode()?;
-    let decoded = Instant::now();
-    let observation = detector.detect(&image);
-    let detected = Instant::now();
-    let mut found =
-        DetectedImage::new(shown.to_owned(), [image.width(), image.height()], &observation);
-    if args.timings {
-        found.decode_ms = Some(1e3 * (decoded - start).as_secs_f64());
-        found.detect_ms = Some(1e3 * (detected - decoded).as_secs_f64());
-    }
-    Ok(found)
+/// How to read an image: grey for the detector, in colour for people.
+struct Decode<G, R> {
+    gray: G,
+    rgb: R,
 }
 
 /// One line per image.
