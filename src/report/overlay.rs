@@ -379,7 +379,8 @@ mod tests {
         let at = |x: usize, y: usize| drawn.pixels()[y * 1280 + x];
         // Corner 0 at (30, 40) lies at (121.5, 161.5): untouched itself, with a ring of radius 6 around it.
         assert_eq!(at(121, 161), [128; 3]);
-        assert_eq!(at(121, 167), CORNER);
+        // The pixel at its left is 6.52 away: 0.88 of it lie within the ring's width of 1.8.
+        assert_eq!(at(115, 161), [218, 101, 15]);
         // Halfway to corner 1 the lattice's line, one pixel wide, covers half of each of two rows.
         assert_eq!([at(161, 161), at(161, 162)], [[179, 113, 64]; 2]);
         // The id right above: a plate with a zero in it.
