@@ -49,7 +49,7 @@ const LEAST_MOST_SADDLES: usize = 600;
 const MIN_NODES: usize = 6;
 /// Lattices tried on one level, largest first.
 const MOST_LATTICES: usize = 4;
-/// Half of the image's diagonal in pixels of the coarsest level tried.
+/// The shorter side of the coarsest level tried, pixels.
 const COARSEST: usize = 120;
 /// Rounds of looking for corners that the last round brought into reach.
 const MOST_PASSES: usize = 4;

@@ -178,7 +178,7 @@ impl Evidence {
 
 impl Finding {
     /// Nothing known yet.
-    pub(super) const fn new(code: Code, unit: Unit) -> Self {
+    pub(crate) const fn new(code: Code, unit: Unit) -> Self {
         Self {
             code,
             verdict: Verdict::Unknown,

@@ -296,35 +296,12 @@ fn solve_scaled(normal: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f
 mod tests {
     use super::*;
     use crate::{
-        camera::{Brown, Camera, Distortion, RadialTable, TablePair},
+        camera::{Brown, Camera, Distortion},
         detect::Corner,
+        diagnose::tests::{Noise, pinhole, tables},
         geom::{Board, Color, Pose, Rotation},
         pose::Weighting,
     };
-
-    struct Noise(u64);
-    impl Noise {
-        fn uniform(&mut self) -> f64 {
-            self.0 = self
-                .0
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (self.0 >> 11) as f64 / (1u64 << 53) as f64
-        }
-        fn normal(&mut self) -> f64 {
-            (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
-        }
-    }
-
-    fn pinhole(focal_px: f64) -> Intrinsics {
-        Intrinsics { fx: focal_px, fy: focal_px, cx: 318.9, cy: 239.8, width: 640, height: 480 }
-    }
-
-    /// Like the iPad's: 4 px at the corner.
-    fn tables() -> TablePair {
-        let table = (0..42).map(|i| -0.01 * (f64::from(i) / 41.0).powi(2)).collect();
-        TablePair::from_inverse(RadialTable::new(Pixel::new(318.9, 239.8), 400.0, table).unwrap())
-    }
 
     /// Corners that `truth` sees of a board that may be wavy, with poses fitted by another camera.
     fn views(

@@ -15,26 +15,26 @@ use crate::{
 
 static BOARD: LazyLock<CharucoBoard> = LazyLock::new(|| CharucoBoard::paper(0.020875).unwrap());
 
-struct Noise(u64);
+pub(super) struct Noise(pub(super) u64);
 
 impl Noise {
-    fn uniform(&mut self) -> f64 {
+    pub(super) fn uniform(&mut self) -> f64 {
         self.0 =
             self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    fn normal(&mut self) -> f64 {
+    pub(super) fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
     }
 }
 
-fn pinhole(focal_px: f64) -> Intrinsics {
+pub(super) fn pinhole(focal_px: f64) -> Intrinsics {
     Intrinsics { fx: focal_px, fy: focal_px, cx: 318.9, cy: 239.8, width: 640, height: 480 }
 }
 
 /// Like the iPad's: 4 px at the corner.
-fn tables() -> TablePair {
+pub(super) fn tables() -> TablePair {
     let table = (0..42).map(|i| -0.01 * (f64::from(i) / 41.0).powi(2)).collect();
     TablePair::from_inverse(RadialTable::new(Pixel::new(318.9, 239.8), 400.0, table).unwrap())
 }

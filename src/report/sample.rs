@@ -204,18 +204,7 @@ fn calibration(frames: &[FrameAudit]) -> Calibration {
 }
 
 fn findings() -> Vec<Finding> {
-    let base = |code, verdict, unit| Finding {
-        code,
-        verdict,
-        value: None,
-        sigma: None,
-        unit,
-        tolerance: None,
-        summary: String::new(),
-        evidence: Vec::new(),
-        what_to_do: String::new(),
-        correction: None,
-    };
+    let base = |code, verdict, unit| Finding { verdict, ..Finding::new(code, unit) };
     vec![
         Finding {
             summary: "Two metadata entries have no image; no frame is lost by it.".to_owned(),

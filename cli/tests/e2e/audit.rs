@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::{
     Run,
-    scratch::{Scratch, files_of, zip},
+    scratch::{Scratch, files_of, names, zip},
     truedepth, truedepth_in,
 };
 
@@ -16,15 +16,6 @@ fn json(text: &str) -> Value {
 
 fn read(path: impl AsRef<Path>) -> String {
     fs::read_to_string(path.as_ref()).unwrap_or_else(|e| panic!("{}: {e}", path.as_ref().display()))
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let mut names: Vec<_> = fs::read_dir(folder)
-        .expect("a folder")
-        .map(|entry| entry.expect("it lists").file_name().to_string_lossy().into_owned())
-        .collect();
-    names.sort();
-    names
 }
 
 #[test]

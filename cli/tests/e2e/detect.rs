@@ -1,21 +1,15 @@
 //! Detection in images: what is read, what is refused, what is drawn.
 
-use std::{fs, path::Path};
+use std::fs;
 
 use truedepth::image::{Gray, Limits, Rgb};
 
-use crate::{scratch::Scratch, truedepth_in};
+use crate::{
+    scratch::{Scratch, names},
+    truedepth_in,
+};
 
 const BOARD: [&str; 2] = ["--board", "10x8:20mm:10mm:ARUCO_ORIGINAL"];
-
-fn names(folder: &Path) -> Vec<String> {
-    let mut names: Vec<_> = fs::read_dir(folder)
-        .expect("a folder")
-        .map(|entry| entry.expect("it lists").file_name().to_string_lossy().into_owned())
-        .collect();
-    names.sort();
-    names
-}
 
 #[test]
 fn the_content_says_what_a_file_is() {

@@ -99,3 +99,13 @@ pub(crate) fn files_of(folder: &Path, prefix: &str) -> Vec<(String, Vec<u8>)> {
     files.sort();
     files
 }
+
+/// The names in a folder, sorted.
+pub(crate) fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<_> = fs::read_dir(folder)
+        .expect("a folder")
+        .map(|entry| entry.expect("it lists").file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}
