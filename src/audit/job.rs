@@ -7,7 +7,10 @@ use crate::{
     board::{CharucoBoard, Layout},
     calibrate::{self, BoardSurface, Calibration, FrameCorners, RejectedFrame, Rejection},
     camera::{Camera, Distortion},
-    depth::{BoardDepth, against_board, sense},
+    depth::{
+        BoardDepth, Handedness, Patches, RegisterInput, Registration, against_board, handedness,
+        patches, register, sense,
+    },
     detect::{Corner, Detector, Observation},
     diagnose::{Case, Device, DistortionState, Finding, Verdict, diagnose},
     pose::{View, Weighting},
@@ -44,6 +47,11 @@ pub struct Audit {
     pub factory_depth: Option<BoardDepth>,
     /// Depth against the board with the own camera.
     pub own_depth: Option<BoardDepth>,
+    /// Depth against colour and truth, from the board's whole surface with the own camera; `None` without one, and
+    /// where too few frames have depth on the board.
+    pub registration: Option<Registration>,
+    /// Whether the depth maps are mirrored against the colour images; `None` where no pose of the board is known.
+    pub handedness: Option<Handedness>,
     /// Whether the stream still carries the lens' distortion.
     pub distortion_state: DistortionState,
     /// What follows, by code.
@@ -79,6 +87,8 @@ pub struct FrameAudit {
     pub observation: Observation,
     /// The sensor's depth at each corner, metres; `None` on holes. Empty where the frame has no depth or no corner.
     pub sensor_m: Vec<Option<f64>>,
+    /// The depth map in and round the board's outline; `None` where there is none.
+    pub patches: Option<Patches>,
     /// Fraction of the depth map without measurement; `None` where it was not read.
     pub holes: Option<f64>,
     /// The board's pose with the factory's intrinsics.
@@ -205,6 +215,13 @@ pub fn audit_observed(
         .camera
         .is_some()
         .then(|| compare(&board, own.surface(), &frames, |f| f.own_view.as_ref()));
+    let pairs = own.views_with_depth(&frames);
+    let registration = own.camera.as_ref().and_then(|camera| {
+        let calibration = own.calibration.as_ref();
+        register(&RegisterInput { board: &board, camera, calibration, views: &pairs })
+    });
+    let handedness = (!pairs.is_empty()).then(|| handedness(&board, own.surface(), &pairs));
+    drop(pairs);
     let (findings, distortion_state) = diagnose(&Case {
         problems: &recording.problems,
         n_frames,
@@ -219,6 +236,8 @@ pub fn audit_observed(
         own_views: &frames.iter().filter_map(|f| f.own_view.as_ref()).collect::<Vec<_>>(),
         factory_depth: factory_depth.as_ref(),
         own_depth: own_depth.as_ref(),
+        registration: registration.as_ref(),
+        handedness,
         tolerances: options.tolerances,
     });
     observer(Progress { stage: Stage::Judge, done: 1, total: 1 });
@@ -236,6 +255,8 @@ pub fn audit_observed(
         camera: own.camera,
         factory_depth,
         own_depth,
+        registration,
+        handedness,
         distortion_state,
         findings,
     })
@@ -252,7 +273,7 @@ fn look(
     let done = AtomicUsize::new(0);
     observer(Progress { stage: Stage::Detect, done: 0, total });
     let one = |index: usize| {
-        let frame = look_at(recording, &detector, index);
+        let frame = look_at(recording, board, &detector, index);
         let done = 1 + done.fetch_add(1, Ordering::Relaxed);
         observer(Progress { stage: Stage::Detect, done, total });
         frame
@@ -268,7 +289,12 @@ fn look(
     frames.into_iter().collect()
 }
 
-fn look_at(recording: &Recording, detector: &Detector, index: usize) -> Result<FrameAudit, Error> {
+fn look_at(
+    recording: &Recording,
+    board: &CharucoBoard,
+    detector: &Detector,
+    index: usize,
+) -> Result<FrameAudit, Error> {
     let source = &recording.frames[index];
     let mut frame = FrameAudit {
         timestamp: source.timestamp,
@@ -278,6 +304,7 @@ fn look_at(recording: &Recording, detector: &Detector, index: usize) -> Result<F
         size_px: None,
         observation: Observation { corners: Vec::new(), identity: None, rejects: Vec::new() },
         sensor_m: Vec::new(),
+        patches: None,
         holes: None,
         factory_view: None,
         own_view: None,
@@ -303,6 +330,7 @@ fn look_at(recording: &Recording, detector: &Detector, index: usize) -> Result<F
             });
         }
         frame.sensor_m = sense(&map, &frame.observation.corners);
+        frame.patches = patches(&map, board, &frame.observation.corners);
         let n_holes = map.depth_m().iter().filter(|depth| depth.is_nan()).count();
         frame.holes = Some(n_holes as f64 / map.depth_m().len() as f64);
     }
@@ -364,6 +392,21 @@ struct Own {
 impl Own {
     fn surface(&self) -> Option<&BoardSurface> {
         self.calibration.as_ref().and_then(|c| c.surface.as_ref())
+    }
+
+    /// The views that the calibration found, or else those of `frames`, where there is depth.
+    fn views_with_depth<'a>(&'a self, frames: &'a [FrameAudit]) -> Vec<(&'a View, &'a Patches)> {
+        let views: Vec<&View> = match &self.calibration {
+            Some(calibration) => calibration.views.iter().collect(),
+            None if self.camera.is_some() => {
+                frames.iter().filter_map(|f| f.own_view.as_ref()).collect()
+            }
+            None => frames.iter().filter_map(|f| f.factory_view.as_ref()).collect(),
+        };
+        views
+            .into_iter()
+            .filter_map(|view| Some((view, frames[view.frame].patches.as_ref()?)))
+            .collect()
     }
 
     /// The board's pose in a frame with the own camera, corners left out that disagree with all others.

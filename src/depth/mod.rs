@@ -34,9 +34,20 @@
 
 mod against_board;
 mod clustered;
+mod handedness;
 mod line;
+mod patch;
+mod pattern;
+mod rays;
+mod register;
+mod relief;
+mod stance;
 
 pub(crate) use against_board::corner_on;
 pub use against_board::{BoardDepth, FrameDepth, MAX_ERROR_M, Sample, against_board, sense};
 pub(crate) use clustered::{Clustered, Equation};
+pub use handedness::{CornerDepth, Handedness, handedness};
 pub use line::DepthLine;
+pub use patch::{Patch, Patches, patches};
+pub use pattern::{Holes, MAX_INCIDENCE_DEG, NEAR_M, Pattern, PatternCell};
+pub use register::{RegisterInput, Registration, register};

@@ -42,6 +42,8 @@ codes! {
     TD203, "td203_not_rectified", "Lens distortion in the images";
     TD301, "td301_depth_scale", "Depth scale";
     TD302, "td302_depth_bias", "Depth bias";
+    TD401, "td401_zoom", "Depth-to-colour zoom";
+    TD402, "td402_shift", "Depth-to-colour shift";
     TD403, "td403_mirrored", "Mirroring";
     TD501, "td501_distortion_centre", "Principal point and distortion centre";
     TD503, "td503_intrinsics_size", "Size the intrinsics are for";

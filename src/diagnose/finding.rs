@@ -114,8 +114,18 @@ pub enum Correction {
         /// Bias, metres.
         bias_m: f64,
     },
+    /// Resample the depth map to the colour image, never blending: its pixel q holds what belongs to the colour pixel
+    /// c + zoom·(q − shift − c), c the principal point. Changes the data.
+    Align {
+        /// Window of the colour image that the depth map shows, over the whole; 1 where only the shift is at fault.
+        zoom: f64,
+        /// How far depth lies right of and below its place, pixels; 0 where only the zoom is at fault.
+        shift_px: [f64; 2],
+    },
     /// Mirror the images back: changes the data.
     Unmirror,
+    /// Mirror the depth maps alone back: changes the data.
+    UnmirrorDepth,
     /// Divide the intrinsics by reference size over image size: metadata only, safe.
     ScaleIntrinsics {
         /// Factor for fx and cx, and for fy and cy.
@@ -124,13 +134,16 @@ pub enum Correction {
 }
 
 impl Correction {
-    /// `focal`, `undistort`, `depth`, `unmirror` or `scale_intrinsics`: stable, for machines.
+    /// `focal`, `undistort`, `depth`, `align`, `unmirror`, `unmirror_depth` or `scale_intrinsics`: stable, for
+    /// machines.
     pub const fn name(&self) -> &'static str {
         match self {
             Self::Focal { .. } => "focal",
             Self::Undistort { .. } => "undistort",
             Self::Depth { .. } => "depth",
+            Self::Align { .. } => "align",
             Self::Unmirror => "unmirror",
+            Self::UnmirrorDepth => "unmirror_depth",
             Self::ScaleIntrinsics { .. } => "scale_intrinsics",
         }
     }
@@ -210,13 +223,25 @@ pub struct Tolerances {
     pub depth_bias_m: f64,
     /// Residual lens distortion at the corner of the image, pixels.
     pub distortion_px: f64,
+    /// Zoom of depth against colour, fraction.
+    pub zoom: f64,
+    /// Shift of depth against colour, along either axis, pixels.
+    pub shift_px: f64,
 }
 
 impl Default for Tolerances {
     /// 1 % for focal length and depth scale (at 0.3 m, 3 mm: the sensor's own noise), 3 mm for the bias for the same
-    /// reason, 1 px for distortion (a straight line is then still straight to the eye).
+    /// reason, 1 px for distortion (a straight line is then still straight to the eye); 1 % for the zoom (3 px at the
+    /// image's edge) and 1 px for the shift: depth then belongs to its pixel or the next.
     fn default() -> Self {
-        Self { focal: 0.01, depth_scale: 0.01, depth_bias_m: 0.003, distortion_px: 1.0 }
+        Self {
+            focal: 0.01,
+            depth_scale: 0.01,
+            depth_bias_m: 0.003,
+            distortion_px: 1.0,
+            zoom: 0.01,
+            shift_px: 1.0,
+        }
     }
 }
 

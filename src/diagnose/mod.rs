@@ -35,6 +35,8 @@ mod td201_focal_length;
 mod td203_not_rectified;
 mod td301_depth_scale;
 mod td302_depth_bias;
+mod td401_zoom;
+mod td402_shift;
 mod td403_mirrored;
 mod td501_distortion_centre;
 mod td503_intrinsics_size;

@@ -30,6 +30,12 @@ impl Measured {
         self.focal_px.sigma / self.focal_px.value
     }
 
+    /// What [`relative_sigma`](Self::relative_sigma) has beyond the fit's own sigma.
+    pub(super) fn relative_sigma_beyond_fit(&self) -> f64 {
+        let of_fit = self.formal_sigma_px.unwrap_or(0.0) / self.focal_px.value;
+        (self.relative_sigma().powi(2) - of_fit.powi(2)).max(0.0).sqrt()
+    }
+
     /// True where the own camera's focal length makes up for a distortion it does not know.
     pub(super) fn own_camera_ignores_distortion(&self) -> bool {
         self.origin == Origin::DistortionTakenOut

@@ -3,13 +3,13 @@
 use super::{
     Case, Code, Correction, Evidence, Finding, Unit, Verdict, td201_focal_length::Measured,
 };
-use crate::{calibrate::Estimate, depth::DepthLine};
+use crate::{calibrate::Estimate, depth::Registration};
 
 /// What to record for a line of depth over distance.
 pub(super) const RECORD: &str = "Record the board at several distances (0.2 m to 0.5 m), 20 or more frames, tilted in \
                                  different directions, so that the focal length can be measured, too.";
 
-/// What the depth line says once the focal length's own uncertainty is added: the board's depth is proportional to
+/// What the registration says once the focal length's whole uncertainty is in it: the board's depth is proportional to
 /// the focal length, so that its relative sigma is one of the scale and of every offset, but none of the bias.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scaled {
@@ -22,17 +22,18 @@ pub(super) struct Scaled {
 }
 
 impl Scaled {
-    pub(super) fn new(line: &DepthLine, focal: &Measured) -> Self {
-        let common = focal.relative_sigma();
-        let [near_m, far_m] = line.range_m;
-        let distances_m = [near_m, line.center_m, far_m];
+    pub(super) fn new(found: &Registration, focal: &Measured) -> Self {
+        // The registration knows the fit's own sigma already.
+        let common = focal.relative_sigma_beyond_fit();
+        let [near_m, far_m] = found.range_m;
+        let distances_m = [near_m, found.center_m, far_m];
         Self {
             slope: Estimate {
-                value: line.scale.value - 1.0,
-                sigma: line.scale.sigma.hypot(common),
+                value: found.scale.value - 1.0,
+                sigma: found.scale.sigma.hypot(common),
             },
             errors_m: distances_m.map(|distance_m| {
-                let Estimate { value, sigma } = line.error_at_m(distance_m);
+                let Estimate { value, sigma } = found.error_at_m(distance_m);
                 Estimate { value, sigma: sigma.hypot(common * distance_m) }
             }),
             distances_m,
@@ -53,13 +54,17 @@ impl Scaled {
     }
 }
 
-/// The line and the focal length, where both are fit to judge the sensor by; otherwise why not.
+/// The registration and the focal length, where both are fit to judge the sensor by; otherwise why not.
 pub(super) fn basis<'a>(
     case: &Case<'a>,
     focal: Option<&'a Measured>,
-) -> Result<(&'a DepthLine, &'a Measured), String> {
-    let line = case.own_depth.and_then(|d| d.line.as_ref());
-    let (Some(line), Some(focal)) = (line, focal) else { return Err(why_unknown(case)) };
+) -> Result<(&'a Registration, &'a Measured), String> {
+    if let Some(why) = case.poor_fit() {
+        return Err(why);
+    }
+    let (Some(found), Some(focal)) = (case.registration, focal) else {
+        return Err(why_unknown(case));
+    };
     if focal.own_camera_ignores_distortion() {
         return Err(format!(
             "the stream is distorted (TD203) and the own camera's focal length of {:.2} px makes up for that, so that \
@@ -67,7 +72,7 @@ pub(super) fn basis<'a>(
             focal.own_px
         ));
     }
-    Ok((line, focal))
+    Ok((found, focal))
 }
 
 /// Why the sensor cannot be judged, with what was seen under the factory's focal length.
@@ -77,7 +82,7 @@ fn why_unknown(case: &Case<'_>) -> String {
     } else if case.own_depth.is_none_or(|d| d.frames.iter().all(|f| f.samples.is_empty())) {
         "no frame has depth at the corners of the board".to_owned()
     } else {
-        "there are too few depth samples on the board, or all at one distance".to_owned()
+        "too few frames have depth on the board".to_owned()
     };
     if let Some(mean) = case.factory_depth.and_then(|d| d.mean_of_medians_m) {
         why += &format!(
@@ -93,7 +98,7 @@ fn why_unknown(case: &Case<'_>) -> String {
 pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
     let mut finding = Finding::new(Code::TD301, Unit::Percent);
     finding.tolerance = Some(100.0 * case.tolerances.depth_scale);
-    let (line, focal) = match basis(case, focal) {
+    let (found, focal) = match basis(case, focal) {
         Ok(both) => both,
         Err(why) => {
             finding.summary = format!("Cannot tell whether depth has the right scale: {why}.");
@@ -101,7 +106,7 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
             return finding;
         }
     };
-    let scaled = Scaled::new(line, focal);
+    let scaled = Scaled::new(found, focal);
     let slope = scaled.slope;
     let [_, ratio, _] = scaled.ratios();
     let judge = |deviation| Verdict::of(deviation, case.tolerances.depth_scale);
@@ -121,13 +126,13 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
             ratio,
             "mean ratio of sensor to board; the slope over distance is steeper, but a bias makes up for it",
         ),
-        verdict => (verdict, slope, "slope of a robust line of sensor over board"),
+        verdict => (verdict, slope, "slope over distance, from all of the board's surface"),
     };
     finding.verdict = verdict;
     finding.value = Some(100.0 * deviation.value);
     finding.sigma = Some(100.0 * deviation.sigma);
     finding.evidence = vec![
-        Evidence::estimate("scale", line.scale),
+        Evidence::estimate("scale", found.scale),
         Evidence::estimate(
             "ratio_at_center",
             Estimate { value: 1.0 + ratio.value, sigma: ratio.sigma },
@@ -135,8 +140,8 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
         Evidence::number("relative_sigma_of_focal", focal.relative_sigma()),
         Evidence::number("nearest_m", near_m),
         Evidence::number("farthest_m", far_m),
-        Evidence::number("n_samples", line.n_samples as f64),
-        Evidence::number("n_frames", line.n_frames as f64),
+        Evidence::number("n_patches", found.n_patches as f64),
+        Evidence::number("n_frames", found.n_frames as f64),
     ];
     let words = match verdict {
         Verdict::Fault if deviation.value > 0.0 => "Depth is too long",
@@ -151,14 +156,14 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
         100.0 * deviation.value,
         100.0 * deviation.sigma,
         100.0 * focal.relative_sigma(),
-        line.n_samples,
-        line.n_frames,
+        found.n_patches,
+        found.n_frames,
         100.0 * case.tolerances.depth_scale,
     );
     match verdict {
         Verdict::Fault => {
             // Without a bias worth the name the mean ratio knows the scale best.
-            let with_bias = line.bias_m.value.abs() > 3.0 * line.bias_m.sigma;
+            let with_bias = found.bias_m.value.abs() > 3.0 * found.bias_m.sigma;
             let scale = 1.0 + if with_bias { deviation.value } else { ratio.value };
             finding.what_to_do = format!(
                 "Divide depth by {scale:.4}. Make sure first that the board's squares really measure {:.3} mm: a board \

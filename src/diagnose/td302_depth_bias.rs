@@ -10,7 +10,7 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
     let mut finding = Finding::new(Code::TD302, Unit::Mm);
     let tolerance_m = case.tolerances.depth_bias_m;
     finding.tolerance = Some(1e3 * tolerance_m);
-    let (line, focal) = match basis(case, focal) {
+    let (found, focal) = match basis(case, focal) {
         Ok(both) => both,
         Err(why) => {
             finding.summary = format!("Cannot tell whether depth has a bias: {why}.");
@@ -18,11 +18,11 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
             return finding;
         }
     };
-    let scaled = Scaled::new(line, focal);
+    let scaled = Scaled::new(found, focal);
     let offset_m = scaled.offset_m();
     let judge = |deviation_m| Verdict::of(deviation_m, tolerance_m);
     let somewhere = scaled.errors_m.into_iter().any(|error_m| judge(error_m) == Verdict::Fault);
-    let by_bias = judge(line.bias_m);
+    let by_bias = judge(found.bias_m);
     let doubtful = by_bias == Verdict::Unknown || (by_bias == Verdict::Fault && !somewhere);
     // An offset at the recorded distances that is surely small is good enough; one that is not may be a scale just as
     // well, and is TD301's to judge.
@@ -35,18 +35,18 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
                 "at the mean of the recorded distances; followed down to 0 m it would be a guess",
             )
         } else if doubtful {
-            (Verdict::Unknown, line.bias_m, "where a robust line of sensor over board meets 0 m")
+            (Verdict::Unknown, found.bias_m, "where the line of sensor over board meets 0 m")
         } else {
-            (by_bias, line.bias_m, "where a robust line of sensor over board meets 0 m")
+            (by_bias, found.bias_m, "where the line of sensor over board meets 0 m")
         };
     finding.verdict = verdict;
     finding.value = Some(1e3 * deviation_m.value);
     finding.sigma = Some(1e3 * deviation_m.sigma);
     finding.evidence = vec![
-        Evidence::estimate("bias_m", line.bias_m),
+        Evidence::estimate("bias_m", found.bias_m),
         Evidence::estimate("offset_at_center_m", offset_m),
-        Evidence::number("center_m", line.center_m),
-        Evidence::number("correlation_with_scale", line.correlation),
+        Evidence::number("center_m", found.center_m),
+        Evidence::number("correlation_with_scale", found.scale_bias_correlation()),
     ];
     let words = match verdict {
         Verdict::Fault => "Depth has a bias",

@@ -1,6 +1,7 @@
 #![doc = include_str!("td403_mirrored.md")]
 
 use super::{Case, Code, Correction, Evidence, Finding, Unit, Verdict};
+use crate::depth::Handedness;
 
 pub(super) fn check(case: &Case<'_>) -> Finding {
     let mut finding = Finding::new(Code::TD403, Unit::Count);
@@ -41,5 +42,40 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
         finding.summary =
             format!("The images are not mirrored: the markers read straight in all {n} frames.");
     }
+    if let Some(depth) = case.handedness {
+        add_depth(&mut finding, depth);
+    }
     finding
+}
+
+/// Frames that must agree before depth alone counts as mirrored.
+const LEAST_FRAMES: usize = 3;
+
+/// Depth against colour, beside what the markers say of both.
+fn add_depth(finding: &mut Finding, depth: Handedness) {
+    let Handedness { n_straight, n_mirrored, n_open } = depth;
+    finding.evidence.extend([
+        Evidence::number("n_depth_straight", n_straight as f64),
+        Evidence::number("n_depth_mirrored", n_mirrored as f64),
+        Evidence::number("n_depth_open", n_open as f64),
+    ]);
+    let clear = n_straight + n_mirrored;
+    if n_mirrored >= LEAST_FRAMES && 10 * n_mirrored >= 9 * clear {
+        let colour = std::mem::replace(&mut finding.verdict, Verdict::Fault);
+        finding.value = Some(n_mirrored as f64);
+        finding.summary = format!(
+            "The depth maps are mirrored against the colour images: in {n_mirrored} of {clear} frames with a tilted \
+             board depth fits the board only when it is mirrored. {}",
+            finding.summary
+        );
+        // Colour mirrored and depth straight: it is colour that has to be turned, and that is what the finding says.
+        if colour != Verdict::Fault {
+            finding.what_to_do = "Mirror the depth maps back, left for right.".to_owned();
+            finding.correction = Some(Correction::UnmirrorDepth);
+        }
+    } else if n_straight >= LEAST_FRAMES {
+        finding.summary += &format!(
+            " Depth lies as colour does in {n_straight} of {clear} frames with a tilted board."
+        );
+    }
 }

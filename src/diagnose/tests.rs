@@ -6,7 +6,9 @@ use super::{Case, Code, Correction, DistortionState, Finding, Tolerances, Verdic
 use crate::{
     board::{CharucoBoard, Layout},
     camera::{Camera, Distortion, Intrinsics, RadialTable, TablePair},
-    depth::{BoardDepth, against_board},
+    depth::{
+        BoardDepth, CornerDepth, Patch, Patches, RegisterInput, against_board, handedness, register,
+    },
     detect::{Corner, Identity, Observation},
     geom::{Board, Color, Pixel, Pose, Rotation, Vector3},
     pose::{View, Weighting},
@@ -46,6 +48,10 @@ struct World {
     /// Sensor = scale · depth + bias.
     scale: f64,
     bias_m: f64,
+    /// The depth map shows the colour image's pixel c + zoom·(q − shift − c) at q.
+    zoom: f64,
+    shift_px: [f64; 2],
+    depth_mirrored: bool,
     /// Smallest and largest distance of the board, metres.
     range_m: [f64; 2],
     mirrored: bool,
@@ -66,11 +72,58 @@ impl World {
             truth: camera,
             scale: 1.0,
             bias_m: 0.0,
+            zoom: 1.0,
+            shift_px: [0.0; 2],
+            depth_mirrored: false,
             range_m: [0.2, 0.45],
             mirrored: false,
             factory,
             problems: Vec::new(),
         }
+    }
+
+    /// What the sensor says of the board at this pose.
+    fn patches(&self, pose: &Pose<Color, Board>, corners: &[Corner], noise: &mut Noise) -> Patches {
+        let pinhole = &self.truth.intrinsics;
+        let normal = pose.rotation * Vector3::z();
+        let depth = |q: Pixel| {
+            let window = |q: f64, shift: f64, c: f64| c + self.zoom * (q - shift - c);
+            let p = Pixel::new(
+                window(q.x, self.shift_px[0], pinhole.cx),
+                window(q.y, self.shift_px[1], pinhole.cy),
+            );
+            let [u, v] = self.truth.unproject(p)?;
+            let ray = Vector3::new(u, v, 1.0);
+            let depth_m = normal.dot(&pose.translation) / normal.dot(&ray);
+            let on_board = pose.rotation.inverse() * (ray * depth_m - pose.translation);
+            let inside = (0.0..0.20875).contains(&on_board.x) && (0.0..0.167).contains(&on_board.y);
+            Some((self.scale * depth_m + self.bias_m, inside))
+        };
+        let side_px = 16;
+        let mut measured = Vec::new();
+        for (x, y) in (0..30).flat_map(|j| (0..40).map(move |i| (16 * i, 16 * j))) {
+            let at = Pixel::new(f64::from(x) + 7.5, f64::from(y) + 7.5);
+            if let Some((depth_m, true)) = depth(at) {
+                measured.push(Patch {
+                    at,
+                    inverse_per_m: (depth_m + 0.0002 * noise.normal()).recip(),
+                    noise_m: 0.0003,
+                    n: 256,
+                    n_holes: 0,
+                });
+            }
+        }
+        let corners = corners
+            .iter()
+            .map(|corner| {
+                let mirrored = Pixel::new(639.0 - corner.pixel.x, corner.pixel.y);
+                let [here, there] = [corner.pixel, mirrored].map(|q| Some(depth(q)?.0));
+                let [straight_m, mirrored_m] =
+                    if self.depth_mirrored { [there, here] } else { [here, there] };
+                CornerDepth { id: corner.id, straight_m, mirrored_m }
+            })
+            .collect();
+        Patches { side_px, measured, torn: Vec::new(), corners }
     }
 
     fn judge(&self) -> (Vec<Finding>, DistortionState) {
@@ -79,6 +132,7 @@ impl World {
         let mut factory_views = Vec::new();
         let mut own_views = Vec::new();
         let mut sensed = Vec::new();
+        let mut patches = Vec::new();
         let straight = Camera { intrinsics: self.factory.intrinsics, distortion: Distortion::None };
         for frame in 0..20 {
             let axis = Vector3::new(noise.normal(), noise.normal(), 0.0).normalize();
@@ -107,6 +161,7 @@ impl World {
             factory_views.push(fit(&straight));
             own_views.extend(self.own.as_ref().map(fit));
             sensed.push(depths);
+            patches.push(self.patches(&pose, &corners, &mut noise));
             let identity = Identity {
                 layout: Layout::Legacy,
                 mirrored: self.mirrored,
@@ -126,6 +181,11 @@ impl World {
         };
         let factory_depth = compare(&factory_views);
         let own_depth = self.own.is_some().then(|| compare(&own_views));
+        let views = if self.own.is_some() { &own_views } else { &factory_views };
+        let pairs: Vec<_> = views.iter().zip(&patches).collect();
+        let registration = self.own.as_ref().and_then(|camera| {
+            register(&RegisterInput { board: &BOARD, camera, calibration: None, views: &pairs })
+        });
         diagnose(&Case {
             problems: &self.problems,
             n_frames: observations.len(),
@@ -140,6 +200,8 @@ impl World {
             own_views: &own_views.iter().collect::<Vec<_>>(),
             factory_depth: Some(&factory_depth),
             own_depth: own_depth.as_ref(),
+            registration: registration.as_ref(),
+            handedness: Some(handedness(&BOARD, None, &pairs)),
             tolerances: Tolerances::default(),
         })
     }
@@ -287,4 +349,41 @@ fn metadata_facts() {
     }
     world.problems.push(Problem::ColorWithoutDepth { timestamps: vec![3] });
     assert_eq!(world.finding(Code::TD101).verdict, Verdict::Warning);
+}
+
+#[test]
+fn a_zoomed_depth_map_is_one_fault_and_no_other() {
+    for zoom in [0.9507, 1.03] {
+        let world = World { zoom, ..World::true_one() };
+        assert_eq!(world.faults(), [Code::TD401]);
+        let finding = world.finding(Code::TD401);
+        let (value, sigma) = (finding.value.unwrap(), finding.sigma.unwrap());
+        assert!((value - 100.0 * (zoom - 1.0)).abs() < 3.0 * sigma && sigma < 0.2, "{finding:?}");
+        let Some(Correction::Align { zoom: found, shift_px: [0.0, 0.0] }) = finding.correction
+        else {
+            panic!("{finding:?}")
+        };
+        assert!((found - zoom).abs() < 0.005);
+    }
+}
+
+#[test]
+fn a_shifted_depth_map_is_one_fault_and_no_other() {
+    let world = World { shift_px: [3.0, -2.0], ..World::true_one() };
+    assert_eq!(world.faults(), [Code::TD402]);
+    let finding = world.finding(Code::TD402);
+    let Some(Correction::Align { zoom: 1.0, shift_px: [x, y] }) = finding.correction else {
+        panic!("{finding:?}")
+    };
+    let sigma = finding.sigma.unwrap();
+    assert!((x - 3.0).hypot(y + 2.0) < 4.0 * sigma && sigma < 0.3, "{finding:?}");
+}
+
+#[test]
+fn a_mirrored_depth_map() {
+    let world = World { depth_mirrored: true, ..World::true_one() };
+    let finding = world.finding(Code::TD403);
+    assert_eq!(finding.verdict, Verdict::Fault, "{finding:?}");
+    assert_eq!(finding.correction, Some(Correction::UnmirrorDepth));
+    assert_eq!(World::true_one().finding(Code::TD403).verdict, Verdict::Ok);
 }

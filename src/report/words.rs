@@ -63,6 +63,19 @@ fn row(audit: &Audit, finding: &Finding) -> Row {
             "0 mm".to_owned(),
             judged.map_or_else(dash, |d| format!("{} mm", value_and_sigma(d, 2))),
         ),
+        Code::TD401 => {
+            ("1".to_owned(), judged.map_or_else(dash, |d| value_and_sigma(as_scale(d), 4)))
+        }
+        Code::TD402 => {
+            let axis = |name: &str| {
+                let found = finding.evidence.iter().find(|evidence| evidence.name == name)?;
+                let sigma = found.sigma.unwrap_or(f64::NAN);
+                Some(signed_with_sigma(Estimate { value: found.value, sigma }, 2))
+            };
+            let both = axis("shift_x_px").zip(axis("shift_y_px"));
+            let zero = "0, 0 px".to_owned();
+            (zero, both.map_or_else(dash, |(x, y)| format!("{x}, {y} px")))
+        }
         Code::TD403 => {
             let answer = |n: f64| {
                 if n > 0.0 { format!("in {} frames", plain(n, 0)) } else { "no".to_owned() }

@@ -4,6 +4,7 @@
 
 mod detect;
 mod photos;
+mod real_alignment;
 mod real_audit;
 mod recording;
 mod sheet;

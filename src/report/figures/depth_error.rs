@@ -11,7 +11,7 @@ use crate::{
     depth::{BoardDepth, FrameDepth, MAX_ERROR_M},
     report::{
         svg::{MARGINS, Plot, domain_of, n},
-        words::{count, in_mm, plain, signed, signed_with_sigma, value_and_sigma},
+        words::{count, in_mm, plain, signed, signed_with_sigma},
     },
 };
 
@@ -246,19 +246,12 @@ pub(in crate::report) fn error_by_range(audit: &Audit) -> Option<Figure> {
         }
         (plot.x_axis("depth of the board, mm"))
     };
-    let line = depth.line.as_ref().map_or(String::new(), |line| {
-        format!(
-            " The straight line through all of them: scale {}, bias {} mm.",
-            value_and_sigma(line.scale, 4),
-            value_and_sigma(in_mm(line.bias_m), 2)
-        )
-    });
     Some(Figure {
         id: "depth-range",
         title: "Depth error against distance".to_owned(),
         caption: format!(
             "With the {name} intrinsics. A level band is a bias; a slope is a wrong scale or focal length; a bend is \
-             the sensor's own.{line}"
+             the sensor's own."
         ),
         legend: vec![
             Key { class: "series-cloud", words: "a corner in a frame" },

@@ -215,7 +215,14 @@ fn correction_words(correction: &Correction) -> String {
             words::plain(1e3 * bias_m, 2),
             words::plain(*scale, 5)
         ),
+        Correction::Align { zoom, shift_px: [x, y] } => format!(
+            "Resample depth to colour: zoom {}, shift {} px to the right and {} px down.",
+            words::plain(*zoom, 4),
+            words::plain(*x, 2),
+            words::plain(*y, 2)
+        ),
         Correction::Unmirror => "Mirror the images back.".to_owned(),
+        Correction::UnmirrorDepth => "Mirror the depth maps back.".to_owned(),
         Correction::ScaleIntrinsics { factor: [x, y] } => format!(
             "Multiply fx and cx by {}, fy and cy by {}.",
             words::trimmed(*x, 5),

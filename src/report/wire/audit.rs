@@ -9,7 +9,7 @@ use crate::{
     audit::{self, FrameAudit},
     board::{CharucoBoard, Layout},
     calibrate::Estimate,
-    depth::{BoardDepth, FrameDepth},
+    depth::{BoardDepth, FrameDepth, Pattern},
     diagnose::{self, Device, Finding},
     recording::Factory,
 };
@@ -111,7 +111,7 @@ pub struct Depth {
     pub own_median_error_mm: Option<f64>,
     /// Spread of the frames' medians over the root of their number.
     pub own_median_error_sigma_mm: Option<f64>,
-    /// sensor = scale · board + bias, poses by the own camera (by the factory's intrinsics where there is none).
+    /// sensor = scale · board + bias, from the board's whole surface, poses by the own camera; `null` without one.
     pub scale: Option<f64>,
     /// Standard deviation of `scale`.
     pub scale_sigma: Option<f64>,
@@ -123,10 +123,40 @@ pub struct Depth {
     pub scale_bias_correlation: Option<f64>,
     /// Smallest and largest depth of the board.
     pub range_mm: Option<[f64; 2]>,
-    /// Robust standard deviation of the samples about the line.
-    pub residual_mm: Option<f64>,
+    /// What is left when scale, bias and alignment are taken out.
+    pub noise: Option<DepthNoise>,
+    /// Where in the image it is left.
+    pub residual_map: Option<ResidualMap>,
     /// Frames with depth and board.
     pub per_frame: Vec<FrameDepthInfo>,
+}
+
+/// Noise and holes of the depth maps on the board.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DepthNoise {
+    /// Standard deviation of single pixels about small planes.
+    pub pixel_mm: Option<f64>,
+    /// Standard deviation from frame to frame at one place of the image: slow noise and errors of the poses.
+    pub frame_mm: Option<f64>,
+    /// RMS over the image of what stays the same in all frames.
+    pub fixed_mm: Option<f64>,
+    /// Share of the pixels on the board without measurement.
+    pub hole_share: Option<f64>,
+    /// The same where the board is 0.2 m away or more and seen under 60 degrees at most.
+    pub hole_share_in_reach: Option<f64>,
+}
+
+/// Sensor minus model over the image.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ResidualMap {
+    /// Side of a cell.
+    pub cell_px: usize,
+    /// Cells along a row.
+    pub columns: usize,
+    /// Median of each cell, row by row; `null` where no frame showed the board.
+    pub median_mm: Vec<Option<f64>>,
+    /// Frames that showed the board there.
+    pub n_frames: Vec<usize>,
 }
 
 /// One frame's depth against the board.
@@ -145,14 +175,19 @@ pub struct FrameDepthInfo {
 /// Depth against colour; `null` is "not measured".
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Alignment {
-    /// Size of the depth image against the colour image.
+    /// Width of the window of the colour image that the depth map shows over the width of the image, about the
+    /// principal point: 1 where they are aligned.
     pub zoom: Option<f64>,
     /// Standard deviation of `zoom`.
     pub zoom_sigma: Option<f64>,
-    /// Shift of depth against colour.
+    /// How far depth lies right of and below its place in the colour image.
     pub shift_px: Option<[f64; 2]>,
+    /// Standard deviations of `shift_px`.
+    pub shift_sigma_px: Option<[f64; 2]>,
     /// Whether the images show the board mirrored.
     pub mirrored: Option<bool>,
+    /// Whether the depth maps are mirrored against the colour images.
+    pub depth_mirrored: Option<bool>,
 }
 
 /// One thing that was checked.
@@ -195,7 +230,7 @@ pub struct EvidenceInfo {
 /// What would make the data true.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CorrectionInfo {
-    /// `focal`, `undistort`, `depth`, `unmirror` or `scale_intrinsics`.
+    /// `focal`, `undistort`, `depth`, `align`, `unmirror`, `unmirror_depth` or `scale_intrinsics`.
     pub kind: String,
     /// Whether images or depth maps change, not only metadata.
     pub changes_data: bool,
@@ -243,16 +278,30 @@ impl From<&audit::Audit> for Audit {
                 Calibration::new(&audit.name, audit.method.name(), factory, calibration)
             }),
             no_calibration: audit.no_calibration.clone(),
-            depth: Depth::new(audit.factory_depth.as_ref(), audit.own_depth.as_ref()),
-            alignment: Alignment {
-                zoom: None,
-                zoom_sigma: None,
-                shift_px: None,
-                mirrored: mirrored(&audit.frames),
-            },
+            depth: Depth::new(audit),
+            alignment: Alignment::new(audit),
             distortion_state: audit.distortion_state.name().to_owned(),
             findings: audit.findings.iter().map(FindingInfo::from).collect(),
             frames: audit.frames.iter().enumerate().map(Frame::from).collect(),
+        }
+    }
+}
+
+impl Alignment {
+    fn new(audit: &audit::Audit) -> Self {
+        let found = audit.registration.as_ref();
+        let shift = |of: fn(&Estimate) -> f64| {
+            let [x, y] = found?.shift_px.each_ref().map(of);
+            finite(x).zip(finite(y)).map(|(x, y)| [x, y])
+        };
+        let handedness = audit.handedness.filter(|h| h.n_straight + h.n_mirrored > 0);
+        Self {
+            zoom: found.and_then(|r| finite(r.zoom.value)),
+            zoom_sigma: found.and_then(|r| finite(r.zoom.sigma)),
+            shift_px: shift(|e| e.value),
+            shift_sigma_px: shift(|e| e.sigma),
+            mirrored: mirrored(&audit.frames),
+            depth_mirrored: handedness.map(|h| h.n_mirrored > h.n_straight),
         }
     }
 }
@@ -310,26 +359,53 @@ impl Board {
 }
 
 impl Depth {
-    fn new(factory: Option<&BoardDepth>, own: Option<&BoardDepth>) -> Option<Self> {
+    fn new(audit: &audit::Audit) -> Option<Self> {
+        let (factory, own) = (audit.factory_depth.as_ref(), audit.own_depth.as_ref());
         let frames = &factory.or(own)?.frames;
         let error = |depth: Option<&BoardDepth>| depth.and_then(|depth| depth.mean_of_medians_m);
         let value_mm = |estimate: Option<Estimate>| estimate.and_then(|e| finite(1e3 * e.value));
         let sigma_mm = |estimate: Option<Estimate>| estimate.and_then(|e| finite(1e3 * e.sigma));
-        let line = own.or(factory).and_then(|depth| depth.line.as_ref());
+        let found = audit.registration.as_ref();
         Some(Self {
             factory_median_error_mm: value_mm(error(factory)),
             factory_median_error_sigma_mm: sigma_mm(error(factory)),
             own_median_error_mm: value_mm(error(own)),
             own_median_error_sigma_mm: sigma_mm(error(own)),
-            scale: line.and_then(|line| finite(line.scale.value)),
-            scale_sigma: line.and_then(|line| finite(line.scale.sigma)),
-            bias_mm: value_mm(line.map(|line| line.bias_m)),
-            bias_sigma_mm: sigma_mm(line.map(|line| line.bias_m)),
-            scale_bias_correlation: line.and_then(|line| finite(line.correlation)),
-            range_mm: line.map(|line| line.range_m.map(|depth_m| 1e3 * depth_m)),
-            residual_mm: line.and_then(|line| finite(1e3 * line.residual_m)),
+            scale: found.and_then(|r| finite(r.scale.value)),
+            scale_sigma: found.and_then(|r| finite(r.scale.sigma)),
+            bias_mm: value_mm(found.map(|r| r.bias_m)),
+            bias_sigma_mm: sigma_mm(found.map(|r| r.bias_m)),
+            scale_bias_correlation: found.and_then(|r| finite(r.scale_bias_correlation())),
+            range_mm: found.map(|r| r.range_m.map(|depth_m| 1e3 * depth_m)),
+            noise: found.map(|r| DepthNoise::from(&r.pattern)),
+            residual_map: found.map(|r| ResidualMap::from(&r.pattern)),
             per_frame: frames.iter().map(|frame| FrameDepthInfo::new(frame, own)).collect(),
         })
+    }
+}
+
+impl From<&Pattern> for DepthNoise {
+    fn from(pattern: &Pattern) -> Self {
+        let holes = &pattern.holes;
+        Self {
+            pixel_mm: finite(1e3 * pattern.pixel_noise_m),
+            frame_mm: finite(1e3 * pattern.frame_noise_m),
+            fixed_mm: finite(1e3 * pattern.fixed_m),
+            hole_share: finite(holes.n_holes as f64 / holes.n_pixels as f64),
+            hole_share_in_reach: holes.share_in_reach(),
+        }
+    }
+}
+
+impl From<&Pattern> for ResidualMap {
+    fn from(pattern: &Pattern) -> Self {
+        let cells = &pattern.cells;
+        Self {
+            cell_px: pattern.cell_px,
+            columns: pattern.columns,
+            median_mm: cells.iter().map(|cell| finite(1e3 * cell.median_m)).collect(),
+            n_frames: cells.iter().map(|cell| cell.n_frames).collect(),
+        }
     }
 }
 
@@ -380,6 +456,9 @@ impl From<&diagnose::Correction> for CorrectionInfo {
             diagnose::Correction::Focal { focal_px } => vec![("focal_px", *focal_px)],
             diagnose::Correction::Depth { scale, bias_m } => {
                 vec![("scale", *scale), ("bias_mm", 1e3 * bias_m)]
+            }
+            diagnose::Correction::Align { zoom, shift_px: [x, y] } => {
+                vec![("zoom", *zoom), ("shift_x_px", *x), ("shift_y_px", *y)]
             }
             diagnose::Correction::ScaleIntrinsics { factor: [x, y] } => {
                 vec![("factor_x", *x), ("factor_y", *y)]

@@ -19,8 +19,8 @@ mod calibration;
 mod detect;
 
 pub use audit::{
-    Alignment, Audit, Board, CorrectionInfo, Depth, DeviceInfo, EvidenceInfo, FactoryInfo,
-    FindingInfo, Frame, FrameDepthInfo,
+    Alignment, Audit, Board, CorrectionInfo, Depth, DepthNoise, DeviceInfo, EvidenceInfo,
+    FactoryInfo, FindingInfo, Frame, FrameDepthInfo, ResidualMap,
 };
 pub use calibration::{
     Calibration, Candidate, Distortion, DistortionTest, Hypothesis, Outlier, Parameter, Table, View,

@@ -1,0 +1,199 @@
+//! The board's whole surface in a depth map, reduced to some hundred patches.
+
+use super::CornerDepth;
+use crate::{
+    board::CharucoBoard,
+    detect::Corner,
+    geom::{Homography, Pixel},
+    image::DepthMap,
+};
+
+/// A small square of a depth map: one plane's worth of depth.
+///
+/// A plane's *inverse* depth is linear in the pixel for a pinhole, so that its mean over any pixels is its value at
+/// their mean position, exactly, holes or not.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Patch {
+    /// Mean position of the pixels that count, in the depth map.
+    pub at: Pixel,
+    /// Mean of 1/depth over them, per metre.
+    pub inverse_per_m: f64,
+    /// Standard deviation of single pixels about the patch's own plane, metres.
+    pub noise_m: f64,
+    /// Pixels that count.
+    pub n: usize,
+    /// Pixels without measurement.
+    pub n_holes: usize,
+}
+
+/// What a depth map says in and around the board's outline.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Patches {
+    /// Side of a patch, pixels.
+    pub side_px: usize,
+    /// Patches with at least half of their pixels measured, row by row.
+    pub measured: Vec<Patch>,
+    /// Middles of the patches that have fewer, with the number of pixels without measurement.
+    pub torn: Vec<(Pixel, usize)>,
+    /// Depth at the corners, straight and mirrored, by ascending id.
+    pub corners: Vec<CornerDepth>,
+}
+
+/// So many patches would fill the outline: enough to see the sensor's patterns, few enough to keep for every frame.
+const PATCHES: f64 = 600.0;
+/// Patches reach so far beyond the outline, squares: where depth does not lie where colour does, the board's rim is
+/// elsewhere in the depth map.
+const RIM_SQUARES: f64 = 1.0;
+/// A pixel farther than so many standard deviations from its patch's plane does not count.
+const OUTLIER_SIGMAS: f64 = 4.0;
+/// Depth is quantised to 0.1 mm on disk; noise is never taken smaller.
+const LEAST_NOISE_M: f64 = 5e-5;
+
+/// Reduces a depth map to patches where these corners show the board, and a square beyond its outline. `None` for
+/// fewer than six corners or corners that span no area.
+pub fn patches(map: &DepthMap, board: &CharucoBoard, corners: &[Corner]) -> Option<Patches> {
+    if corners.len() < 6 {
+        return None;
+    }
+    let cells: Vec<Pixel> = corners
+        .iter()
+        .map(|corner| {
+            let (column, row) = board.corner_cell(corner.id);
+            Pixel::new(column as f64 + 1.0, row as f64 + 1.0)
+        })
+        .collect();
+    let pixels: Vec<Pixel> = corners.iter().map(|corner| corner.pixel).collect();
+    let pixel_from_cell = Homography::from_points(&cells, &pixels)?;
+    let cell_from_pixel = Homography::from_points(&pixels, &cells)?;
+    let (right, bottom) = (board.squares_x as f64, board.squares_y as f64);
+    // The outline may reach beyond the image, and beyond the horizon: bounds from the part that maps.
+    let rim: Vec<Pixel> = outline(-RIM_SQUARES, right + RIM_SQUARES, bottom + RIM_SQUARES)
+        .filter_map(|cell| pixel_from_cell.map(cell))
+        .collect();
+    let bound = |values: &dyn Fn(&Pixel) -> f64, size: usize| {
+        let low = rim.iter().map(values).fold(f64::INFINITY, f64::min);
+        let high = rim.iter().map(values).fold(f64::NEG_INFINITY, f64::max);
+        (low.clamp(0.0, size as f64) as usize, high.clamp(0.0, size as f64) as usize)
+    };
+    let (left, width) = bound(&|p| p.x, map.width());
+    let (top, height) = bound(&|p| p.y, map.height());
+    let area = (width.saturating_sub(left) * height.saturating_sub(top)) as f64;
+    let side_px = ((area / PATCHES).sqrt().round() as usize).max(4);
+    let inside = |x: usize, y: usize| {
+        cell_from_pixel.map(Pixel::new(x as f64, y as f64)).is_some_and(|cell| {
+            cell.x >= -RIM_SQUARES
+                && cell.y >= -RIM_SQUARES
+                && cell.x <= right + RIM_SQUARES
+                && cell.y <= bottom + RIM_SQUARES
+        })
+    };
+    let read = |corner: &Corner| {
+        let mirrored = Pixel::new(map.width() as f64 - 1.0 - corner.pixel.x, corner.pixel.y);
+        CornerDepth {
+            id: corner.id,
+            straight_m: map.bilinear(corner.pixel),
+            mirrored_m: map.bilinear(mirrored),
+        }
+    };
+    let mut patches = Patches {
+        side_px,
+        measured: Vec::new(),
+        torn: Vec::new(),
+        corners: corners.iter().map(read).collect(),
+    };
+    let mut samples = Vec::with_capacity(side_px * side_px);
+    // A grid fixed to the image, so that patches of all frames lie at the same places.
+    for y in (top / side_px * side_px..height).step_by(side_px) {
+        for x in (left / side_px * side_px..width).step_by(side_px) {
+            let (x1, y1) = (x + side_px - 1, y + side_px - 1);
+            let corners = [(x, y), (x1, y), (x, y1), (x1, y1)];
+            if x1 >= map.width()
+                || y1 >= map.height()
+                || !corners.iter().all(|&(x, y)| inside(x, y))
+            {
+                continue;
+            }
+            let middle = Pixel::new(0.5 * (x + x1) as f64, 0.5 * (y + y1) as f64);
+            samples.clear();
+            for row in y..=y1 {
+                for column in x..=x1 {
+                    let depth_m = f64::from(map.at(column, row));
+                    if depth_m > 0.0 {
+                        let (dx, dy) = (column as f64 - middle.x, row as f64 - middle.y);
+                        samples.push([dx, dy, depth_m.recip()]);
+                    }
+                }
+            }
+            let n_holes = side_px * side_px - samples.len();
+            match patch(middle, &mut samples, n_holes).filter(|p| 2 * p.n >= side_px * side_px) {
+                Some(patch) => patches.measured.push(patch),
+                None => patches.torn.push((middle, n_holes)),
+            }
+        }
+    }
+    Some(patches)
+}
+
+/// Points on the rectangle from (low, low) to (right, bottom).
+fn outline(low: f64, right: f64, bottom: f64) -> impl Iterator<Item = Pixel> {
+    (0..=16).flat_map(move |i| {
+        let share = f64::from(i) / 16.0;
+        let (x, y) = (low + share * (right - low), low + share * (bottom - low));
+        [(x, low), (x, bottom), (low, y), (right, y)].map(|(x, y)| Pixel::new(x, y))
+    })
+}
+
+/// Fits 1/depth = a + b·x + c·y twice: the second time without pixels far off the first plane.
+fn patch(middle: Pixel, samples: &mut Vec<[f64; 3]>, n_holes: usize) -> Option<Patch> {
+    let mut found = None;
+    for _ in 0..2 {
+        let plane = fit_plane(samples)?;
+        let off = |s: &[f64; 3]| s[2] - plane[0] - plane[1] * s[0] - plane[2] * s[1];
+        let squares: f64 = samples.iter().map(|s| off(s).powi(2)).sum();
+        let sigma = (squares / (samples.len() as f64 - 3.0)).sqrt();
+        let n = samples.len() as f64;
+        let mean = |i: usize| samples.iter().map(|s| s[i]).sum::<f64>() / n;
+        let inverse_per_m = mean(2);
+        found = Some(Patch {
+            at: Pixel::new(middle.x + mean(0), middle.y + mean(1)),
+            inverse_per_m,
+            // δz = z²·δ(1/z)
+            noise_m: sigma / inverse_per_m.powi(2),
+            n: samples.len(),
+            n_holes,
+        });
+        let reach = OUTLIER_SIGMAS * sigma.max(LEAST_NOISE_M * inverse_per_m.powi(2));
+        samples.retain(|s| off(s).abs() <= reach);
+    }
+    found
+}
+
+/// `None` for fewer than 8 samples or samples on one line.
+fn fit_plane(samples: &[[f64; 3]]) -> Option<[f64; 3]> {
+    if samples.len() < 8 {
+        return None;
+    }
+    let n = samples.len() as f64;
+    let mut mean = [0.0; 3];
+    for s in samples {
+        for (mean, value) in mean.iter_mut().zip(s) {
+            *mean += value / n;
+        }
+    }
+    let [mut xx, mut xy, mut yy, mut xw, mut yw] = [0.0; 5];
+    for s in samples {
+        let [x, y, w] = [s[0] - mean[0], s[1] - mean[1], s[2] - mean[2]];
+        xx += x * x;
+        xy += x * y;
+        yy += y * y;
+        xw += x * w;
+        yw += y * w;
+    }
+    let determinant = xx * yy - xy * xy;
+    if !(determinant > 1e-6 * xx * yy) {
+        return None;
+    }
+    let b = (yy * xw - xy * yw) / determinant;
+    let c = (xx * yw - xy * xw) / determinant;
+    Some([mean[2] - b * mean[0] - c * mean[1], b, c])
+}

@@ -1,0 +1,545 @@
+//! Depth against colour, all views at once: scale, bias, zoom and shift of the sensor.
+
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+
+use super::{
+    Patch, Patches,
+    pattern::{Holes, MAX_INCIDENCE_DEG, NEAR_M, Pattern, Residual},
+    rays::RayGrid,
+    relief::Relief,
+    stance::{Stance, moved_cameras, stances},
+};
+use crate::{
+    board::CharucoBoard,
+    calibrate::{Calibration, Estimate},
+    camera::Camera,
+    geom::Pixel,
+    pose::View,
+    solve::{Cholesky, Reduced, classical, clustered, larger, mad_sigma},
+};
+
+/// How the depth sensor stands to the colour camera and to the truth, from the board's whole surface in all views.
+///
+/// ```text
+/// sensor(q) = scale · Z(p) + bias,    p = c + zoom·(q − shift − c)
+/// ```
+///
+/// q is a pixel of the depth map, p the pixel of the colour image whose depth it holds, Z the depth of the board there
+/// and c the principal point. A true recording has scale 1, bias 0, zoom 1, shift 0.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Registration {
+    /// 1 for a true sensor.
+    pub scale: Estimate,
+    /// Sensor where the board is at 0, metres.
+    pub bias_m: Estimate,
+    /// Width of the window of the colour image that the depth map shows over the width of the image: 1 where they are
+    /// aligned, 0.9507 for the ARKit recordings of the paper's iPads.
+    pub zoom: Estimate,
+    /// How far depth lies right of and below its place, pixels.
+    pub shift_px: [Estimate; 2],
+    /// Of scale, bias (m), zoom, shift x, shift y (px).
+    pub covariance: [[f64; 5]; 5],
+    /// Mean depth of the board over all patches, metres.
+    pub center_m: f64,
+    /// Smallest and largest depth of the board, metres.
+    pub range_m: [f64; 2],
+    /// Frames with depth on the board.
+    pub n_frames: usize,
+    /// Patches of the depth maps on the board.
+    pub n_patches: usize,
+    /// What is left: by frame, over the image, from pixel to pixel.
+    pub pattern: Pattern,
+}
+
+impl Registration {
+    /// Sensor minus board at this depth of the board, metres.
+    pub fn error_at_m(&self, board_m: f64) -> Estimate {
+        let [[ss, sb, ..], [_, bb, ..], ..] = self.covariance;
+        let variance = board_m * board_m * ss + 2.0 * board_m * sb + bb;
+        Estimate {
+            value: (self.scale.value - 1.0) * board_m + self.bias_m.value,
+            sigma: variance.max(0.0).sqrt(),
+        }
+    }
+
+    /// Correlation of scale and bias, −1 to 1.
+    pub fn scale_bias_correlation(&self) -> f64 {
+        (self.covariance[0][1] / (self.scale.sigma * self.bias_m.sigma)).clamp(-1.0, 1.0)
+    }
+}
+
+/// What a registration starts from.
+#[derive(Clone, Copy, Debug)]
+pub struct RegisterInput<'a> {
+    /// The board.
+    pub board: &'a CharucoBoard,
+    /// The camera that the views were found with.
+    pub camera: &'a Camera,
+    /// The calibration it comes from: its covariance and the board's surface enter; without, the camera is taken as
+    /// exact and the board as flat.
+    pub calibration: Option<&'a Calibration>,
+    /// Views of the board, each with what the depth map of its frame says.
+    pub views: &'a [(&'a View, &'a Patches)],
+}
+
+const N: usize = 5;
+type Numbers = SVector<f64, N>;
+
+/// Scale, bias (m), zoom and shift (px) that no recording is farther from the truth than by about this: keeps what
+/// the views do not determine from running away. Weak beside any recording that tells anything.
+const PRIOR_SIGMA: [f64; N] = [0.3, 0.1, 0.3, 60.0, 60.0];
+/// Frames below this number of patches say nothing about a plane.
+const LEAST_PATCHES: usize = 12;
+/// Frames below this number do not even disagree.
+const LEAST_FRAMES: usize = 3;
+/// Tukey's biweight keeps 95 % efficiency under normal noise with this multiple of the standard deviation.
+const TUKEY: f64 = 4.685;
+/// Beyond this Mahalanobis distance a frame counts only linearly: 1 % of normal ones do (3 degrees of freedom).
+const FRAME_HUBER: f64 = 3.368;
+/// The sensor's noise is alike within cells; a frame shows about so many of them. Only a start: how much the sensor
+/// adds to a plane's error is estimated.
+const NOISE_CELLS: f64 = 30.0;
+/// Noise of a patch relative to others, metres: σ² = floor² + (z²·growth)², after the published recordings.
+const NOISE_FLOOR_M: f64 = 0.17e-3;
+const NOISE_GROWTH_PER_M: f64 = 2.2e-3;
+
+/// Finds scale, bias, zoom and shift with their covariance. `None` for fewer than three frames with depth on the
+/// board.
+///
+/// **Two levels.** Within a frame, robustly, the patches say by which plane the sensor's depth differs from the
+/// board's: three numbers β (as a change of m in m·X = 1), and what each of the five unknowns would do to them, G.
+/// Between frames
+///
+/// ```text
+/// βᵢ = Gᵢ·δθ + εᵢ,   cov εᵢ = κ²·(Σᵢ(pose) + ρ·Σᵢ(sensor))
+/// ```
+///
+/// Σ(pose) follows from the corners' σ, Σ(sensor) has the shape that smooth noise of the sensor gives a plane; ρ and
+/// κ are found by restricted maximum likelihood, so that their sizes are what the frames scatter by. Residuals within
+/// a frame may be correlated in any way: they only count through β.
+///
+/// **σ** is the larger of this model's and of a sandwich estimator clustered by frame, and to it is added what the
+/// camera's own covariance does (poses and rays follow each number of the camera). Not in it: a wrong square length
+/// (the scale is wrong by as much), errors of the board's surface, and what a wrong camera *model* does.
+pub fn register(input: &RegisterInput<'_>) -> Option<Registration> {
+    let RegisterInput { board, camera, calibration, views } = *input;
+    let surface = calibration.and_then(|c| c.surface.as_ref());
+    let parameters = calibration.map_or(&[][..], |c| &c.parameters);
+    let moved = moved_cameras(camera, parameters);
+    let only_views: Vec<&View> = views.iter().map(|(view, _)| *view).collect();
+    let stances = stances(board, surface, camera, &moved, &only_views);
+    let scene = Scene {
+        board,
+        relief: Relief::new(board, surface),
+        rays: RayGrid::new(camera),
+        moved: moved.iter().map(|pair| pair.each_ref().map(RayGrid::new)).collect(),
+        center: Pixel::new(camera.intrinsics.cx, camera.intrinsics.cy),
+    };
+    let frames: Vec<(&Stance, &Patches)> = stances
+        .iter()
+        .filter_map(|stance| {
+            let (_, patches) = views.iter().find(|(view, _)| view.frame == stance.frame)?;
+            Some((stance, *patches))
+        })
+        .collect();
+
+    let mut theta = Numbers::from([1.0, 0.0, 1.0, 0.0, 0.0]);
+    let mut found = None;
+    for _ in 0..12 {
+        let planes: Vec<Plane> = frames
+            .iter()
+            .filter_map(|(stance, patches)| scene.plane(stance, patches, &theta))
+            .collect();
+        if planes.len() < LEAST_FRAMES {
+            return None;
+        }
+        let step = between_frames(&planes, &theta)?;
+        let size = step.delta.component_div(&Numbers::from(PRIOR_SIGMA)).amax();
+        theta += step.delta;
+        found = Some((planes, step));
+        if size < 1e-7 {
+            break;
+        }
+    }
+    let (planes, step) = found?;
+    Some(assemble(input, &scene, &frames, &theta, &planes, &step))
+}
+
+struct Scene<'a> {
+    board: &'a CharucoBoard,
+    relief: Relief,
+    rays: RayGrid,
+    moved: Vec<[RayGrid; 2]>,
+    center: Pixel,
+}
+
+/// A patch before the board.
+struct Sight {
+    /// Depth of the board where the patch looks, metres.
+    board_m: f64,
+    /// Sensor minus model, metres.
+    residual_m: f64,
+    /// By m.
+    by_plane: Vector3<f64>,
+    /// By the five numbers.
+    by_theta: Numbers,
+}
+
+/// What one frame says.
+pub(super) struct Plane {
+    /// By which plane the sensor differs from the model.
+    beta: Vector3<f64>,
+    /// By the five numbers.
+    gain: SMatrix<f64, 3, N>,
+    /// By one σ of each of the camera's numbers.
+    by_camera: Vec<Vector3<f64>>,
+    pose: Matrix3<f64>,
+    sensor: Matrix3<f64>,
+    n_patches: usize,
+    /// Sum, smallest and largest depth of the board.
+    board_m: [f64; 3],
+}
+
+impl Scene<'_> {
+    /// Where a depth pixel looks.
+    fn looked_at(&self, at: Pixel, theta: &Numbers) -> Pixel {
+        let (zoom, dx, dy) = (theta[2], theta[3], theta[4]);
+        Pixel::new(
+            self.center.x + zoom * (at.x - dx - self.center.x),
+            self.center.y + zoom * (at.y - dy - self.center.y),
+        )
+    }
+
+    /// The board's depth along a ray; `None` beside the board.
+    fn board_depth(&self, stance: &Stance, ray: [f64; 2]) -> Option<f64> {
+        let ray = Vector3::new(ray[0], ray[1], 1.0);
+        let flat_m = stance.plane.dot(&ray).recip();
+        if !(flat_m > 0.0 && flat_m.is_finite()) {
+            return None;
+        }
+        let [width_m, height_m] =
+            [self.board.squares_x, self.board.squares_y].map(|n| n as f64 * self.board.square_m);
+        let pose = &stance.color_from_board;
+        let on_board = pose.rotation.inverse() * (ray * flat_m - pose.translation);
+        let inside = |x: f64, size: f64| (0.0..=size).contains(&x);
+        if !(inside(on_board.x, width_m) && inside(on_board.y, height_m)) {
+            return None;
+        }
+        let height = self.relief.height_m(on_board.x, on_board.y);
+        Some(flat_m * (1.0 + height / stance.distance_m))
+    }
+
+    fn sight(&self, stance: &Stance, patch: &Patch, theta: &Numbers) -> Option<Sight> {
+        let at = patch.at;
+        let p = self.looked_at(at, theta);
+        let (ray, [by_x, by_y]) = self.rays.at(p)?;
+        let board_m = self.board_depth(stance, ray)?;
+        let (scale, bias_m, zoom) = (theta[0], theta[1], theta[2]);
+        let square = board_m * board_m;
+        let m = &stance.plane;
+        let slope = [by_x, by_y].map(|by| -square * (m.x * by[0] + m.y * by[1]));
+        let from_center = [at.x - theta[3] - self.center.x, at.y - theta[4] - self.center.y];
+        Some(Sight {
+            board_m,
+            residual_m: patch.inverse_per_m.recip() - (scale * board_m + bias_m),
+            by_plane: -scale * square * Vector3::new(ray[0], ray[1], 1.0),
+            by_theta: Numbers::from([
+                board_m,
+                1.0,
+                scale * (slope[0] * from_center[0] + slope[1] * from_center[1]),
+                -scale * zoom * slope[0],
+                -scale * zoom * slope[1],
+            ]),
+        })
+    }
+
+    /// How the model's depth changes by one σ of each of the camera's numbers, poses standing still, metres.
+    fn by_camera(&self, stance: &Stance, at: Pixel, theta: &Numbers) -> Vec<f64> {
+        let p = self.looked_at(at, theta);
+        let depth = |grid: &RayGrid| self.board_depth(stance, grid.at(p)?.0);
+        self.moved
+            .iter()
+            // At the very rim of board or lens it may be beside it: nothing is known there.
+            .map(|[up, down]| {
+                depth(up).zip(depth(down)).map_or(0.0, |(up, down)| theta[0] * (up - down))
+            })
+            .collect()
+    }
+
+    /// Whether the sensor is made to measure the board where this depth pixel looks.
+    fn in_reach(&self, stance: &Stance, at: Pixel, theta: &Numbers) -> bool {
+        let Some((ray, _)) = self.rays.at(self.looked_at(at, theta)) else { return false };
+        let ray = Vector3::new(ray[0], ray[1], 1.0);
+        let cos_incidence = (stance.plane.dot(&ray) / (stance.plane.norm() * ray.norm())).abs();
+        let far_enough = self.board_depth(stance, [ray.x, ray.y]).is_some_and(|m| m >= NEAR_M);
+        far_enough && cos_incidence >= MAX_INCIDENCE_DEG.to_radians().cos()
+    }
+
+    fn sights<'p>(
+        &self,
+        stance: &Stance,
+        patches: &'p Patches,
+        theta: &Numbers,
+    ) -> Vec<(&'p Patch, Sight)> {
+        patches
+            .measured
+            .iter()
+            .filter_map(|patch| {
+                // The whole patch lies on the board where its corners do.
+                let half = 0.5 * (patches.side_px as f64 - 1.0);
+                let on_board = [(-half, -half), (half, -half), (-half, half), (half, half)]
+                    .iter()
+                    .all(|(dx, dy)| {
+                        let p = self.looked_at(Pixel::new(patch.at.x + dx, patch.at.y + dy), theta);
+                        let seen = self.rays.at(p);
+                        seen.is_some_and(|(ray, _)| self.board_depth(stance, ray).is_some())
+                    });
+                if !on_board {
+                    return None;
+                }
+                Some((patch, self.sight(stance, patch, theta)?))
+            })
+            .collect()
+    }
+
+    /// The first level: one frame's plane, robustly.
+    fn plane(&self, stance: &Stance, patches: &Patches, theta: &Numbers) -> Option<Plane> {
+        let sights = self.sights(stance, patches, theta);
+        let n = sights.len();
+        if n < LEAST_PATCHES {
+            return None;
+        }
+        let precision: Vec<f64> = sights.iter().map(|(_, s)| noise_m(s.board_m).powi(-2)).collect();
+        let mut robust = vec![1.0; n];
+        let mut beta = Vector3::zeros();
+        let mut inverse = Matrix3::identity();
+        for round in 0..10 {
+            let mut normal = Matrix3::zeros();
+            let mut right = Vector3::zeros();
+            for (((_, s), p), w) in sights.iter().zip(&precision).zip(&robust) {
+                normal.ger(p * w, &s.by_plane, &s.by_plane, 1.0);
+                right.axpy(p * w * s.residual_m, &s.by_plane, 1.0);
+            }
+            inverse = normal.try_inverse()?;
+            beta = inverse * right;
+            let left: Vec<f64> = sights
+                .iter()
+                .zip(&precision)
+                .map(|((_, s), p)| (s.residual_m - s.by_plane.dot(&beta)) * p.sqrt())
+                .collect();
+            // Least absolute deviations first: up to half of the patches may show something else.
+            let sigma = mad_sigma(&left, 0.0).max(0.1);
+            for (w, e) in robust.iter_mut().zip(&left) {
+                *w = if round < 5 {
+                    (e.abs() / sigma).max(0.1).recip()
+                } else {
+                    let u = e / (TUKEY * sigma);
+                    if u.abs() < 1.0 { (1.0 - u * u).powi(2) } else { 0.0 }
+                };
+            }
+        }
+        let mut gain = SMatrix::<f64, 3, N>::zeros();
+        let mut by_camera = vec![Vector3::zeros(); self.moved.len()];
+        for (((patch, s), p), w) in sights.iter().zip(&precision).zip(&robust) {
+            let projected = inverse * s.by_plane * (p * w);
+            gain.ger(1.0, &projected, &s.by_theta, 1.0);
+            for (sum, d) in by_camera.iter_mut().zip(self.by_camera(stance, patch.at, theta)) {
+                *sum += projected * d;
+            }
+        }
+        for (sum, m) in by_camera.iter_mut().zip(&stance.by_camera) {
+            *sum += m;
+        }
+        let depths = sights.iter().map(|(_, s)| s.board_m);
+        Some(Plane {
+            beta,
+            gain,
+            by_camera,
+            pose: stance.covariance,
+            sensor: inverse * (n as f64 / NOISE_CELLS),
+            n_patches: n,
+            board_m: [
+                depths.clone().sum(),
+                depths.clone().fold(f64::INFINITY, f64::min),
+                depths.fold(0.0, f64::max),
+            ],
+        })
+    }
+}
+
+/// σ of a patch, up to a factor that does not matter.
+fn noise_m(board_m: f64) -> f64 {
+    NOISE_FLOOR_M.hypot(board_m * board_m * NOISE_GROWTH_PER_M)
+}
+
+/// The second level.
+struct Step {
+    delta: Numbers,
+    covariance: [[f64; N]; N],
+    /// What one σ of each of the camera's numbers does to the five.
+    by_camera: Vec<Numbers>,
+}
+
+fn between_frames(planes: &[Plane], theta: &Numbers) -> Option<Step> {
+    // How much the sensor adds to what the poses are unsure by: the ratio of greatest restricted likelihood.
+    let (ratio, _) = (-16..=16)
+        .map(|i| 10f64.powf(f64::from(i) / 4.0))
+        .filter_map(|ratio| Some((ratio, weigh(planes, theta, ratio)?.likelihood)))
+        .fold((1.0, f64::NEG_INFINITY), |best, each| if each.1 > best.1 { each } else { best });
+    let Weighed { delta, all, parts, variance, weights, .. } = weigh(planes, theta, ratio)?;
+    let model = classical(&all, variance)?;
+    let covariance = clustered(&all, &parts).map_or(model, |c| larger(&model, &c));
+    let n_camera = planes.first().map_or(0, |p| p.by_camera.len());
+    let factor = Cholesky::new(&all.information)?;
+    let by_camera = (0..n_camera)
+        .map(|k| {
+            let mut score = Numbers::zeros();
+            for (plane, (inverse, w)) in planes.iter().zip(&weights) {
+                score += plane.gain.transpose() * (inverse * plane.by_camera[k]) * *w;
+            }
+            -Numbers::from(factor.solve(&score.into()))
+        })
+        .collect();
+    Some(Step { delta, covariance, by_camera })
+}
+
+struct Weighed {
+    delta: Numbers,
+    all: Reduced<N>,
+    parts: Vec<Reduced<N>>,
+    variance: f64,
+    weights: Vec<(Matrix3<f64>, f64)>,
+    likelihood: f64,
+}
+
+fn weigh(planes: &[Plane], theta: &Numbers, ratio: f64) -> Option<Weighed> {
+    let inverses: Vec<(Matrix3<f64>, f64)> = planes
+        .iter()
+        .map(|plane| {
+            let covariance = plane.pose + plane.sensor * ratio;
+            Some((covariance.try_inverse()?, covariance.determinant().ln()))
+        })
+        .collect::<Option<_>>()?;
+    let mut weights = vec![1.0; planes.len()];
+    let mut delta = Numbers::zeros();
+    let mut variance = 1.0;
+    let mut all = Reduced::ZERO;
+    let start = Numbers::from([1.0, 0.0, 1.0, 0.0, 0.0]);
+    for _ in 0..15 {
+        all = Reduced::ZERO;
+        for ((plane, (inverse, _)), w) in planes.iter().zip(&inverses).zip(&weights) {
+            all.add(&reduced(plane, inverse, *w, &plane.beta));
+        }
+        for k in 0..N {
+            // The prior counts as data of variance κ².
+            let precision = variance * PRIOR_SIGMA[k].powi(-2);
+            all.information[k][k] += precision;
+            all.score[k] += precision * (start[k] - theta[k]);
+        }
+        delta = Numbers::from(Cholesky::new(&all.information)?.solve(&all.score));
+        let squares: Vec<f64> = planes
+            .iter()
+            .zip(&inverses)
+            .map(|(plane, (inverse, _))| {
+                let e = plane.beta - plane.gain * delta;
+                e.dot(&(inverse * e))
+            })
+            .collect();
+        let freedom = (3 * planes.len()) as f64 - N as f64;
+        variance = squares.iter().zip(&weights).map(|(s, w)| s * w).sum::<f64>() / freedom.max(1.0);
+        for (w, s) in weights.iter_mut().zip(&squares) {
+            *w = (FRAME_HUBER / (s / variance).sqrt()).min(1.0);
+        }
+    }
+    let determinants: f64 = inverses.iter().map(|(_, ln)| ln).sum();
+    let information = SMatrix::<f64, N, N>::from_fn(|i, j| {
+        all.information[i][j] * PRIOR_SIGMA[i] * PRIOR_SIGMA[j]
+    });
+    let freedom = (3 * planes.len()) as f64 - N as f64;
+    let likelihood =
+        -0.5 * (determinants + information.determinant().ln() + freedom * variance.ln());
+    let parts = planes
+        .iter()
+        .zip(&inverses)
+        .zip(&weights)
+        .map(|((plane, (inverse, _)), w)| {
+            reduced(plane, inverse, *w, &(plane.beta - plane.gain * delta))
+        })
+        .collect();
+    let weights = inverses.into_iter().map(|(inverse, _)| inverse).zip(weights).collect();
+    Some(Weighed { delta, all, parts, variance, weights, likelihood })
+}
+
+fn reduced(plane: &Plane, inverse: &Matrix3<f64>, weight: f64, beta: &Vector3<f64>) -> Reduced<N> {
+    let weighted = plane.gain.transpose() * inverse * weight;
+    let information = weighted * plane.gain;
+    let score = weighted * beta;
+    Reduced {
+        information: std::array::from_fn(|i| std::array::from_fn(|j| information[(i, j)])),
+        score: score.into(),
+    }
+}
+
+fn assemble(
+    input: &RegisterInput<'_>,
+    scene: &Scene<'_>,
+    frames: &[(&Stance, &Patches)],
+    theta: &Numbers,
+    planes: &[Plane],
+    step: &Step,
+) -> Registration {
+    let mut covariance = step.covariance;
+    if let Some(calibration) = input.calibration {
+        let n = calibration.parameters.len();
+        let sigma = |k: usize| calibration.parameters[k].estimate.sigma;
+        for (k, l) in (0..n).flat_map(|k| (0..n).map(move |l| (k, l))) {
+            let correlation = calibration.covariance[k * n + l] / (sigma(k) * sigma(l));
+            if !correlation.is_finite() {
+                continue;
+            }
+            for (i, j) in (0..N).flat_map(|i| (0..N).map(move |j| (i, j))) {
+                covariance[i][j] += correlation * step.by_camera[k][i] * step.by_camera[l][j];
+            }
+        }
+    }
+    let estimate = |k: usize| Estimate { value: theta[k], sigma: covariance[k][k].max(0.0).sqrt() };
+    let n_patches = planes.iter().map(|p| p.n_patches).sum::<usize>();
+    let mut holes = Holes::default();
+    let mut residuals = Vec::with_capacity(n_patches);
+    for (stance, patches) in frames {
+        for (patch, sight) in scene.sights(stance, patches, theta) {
+            holes.add(
+                patch.n + patch.n_holes,
+                patch.n_holes,
+                scene.in_reach(stance, patch.at, theta),
+            );
+            residuals.push(Residual {
+                frame: stance.frame,
+                at: patch.at,
+                residual_m: sight.residual_m,
+                noise_m: patch.noise_m,
+            });
+        }
+        for &(at, n_holes) in &patches.torn {
+            let seen = scene.rays.at(scene.looked_at(at, theta));
+            if seen.is_some_and(|(ray, _)| scene.board_depth(stance, ray).is_some()) {
+                holes.add(patches.side_px.pow(2), n_holes, scene.in_reach(stance, at, theta));
+            }
+        }
+    }
+    Registration {
+        scale: estimate(0),
+        bias_m: estimate(1),
+        zoom: estimate(2),
+        shift_px: [estimate(3), estimate(4)],
+        covariance,
+        center_m: planes.iter().map(|p| p.board_m[0]).sum::<f64>() / n_patches as f64,
+        range_m: [
+            planes.iter().map(|p| p.board_m[1]).fold(f64::INFINITY, f64::min),
+            planes.iter().map(|p| p.board_m[2]).fold(0.0, f64::max),
+        ],
+        n_frames: planes.len(),
+        n_patches,
+        pattern: Pattern::new(&input.camera.intrinsics, &residuals, holes),
+    }
+}

@@ -1,0 +1,74 @@
+#![doc = include_str!("td401_zoom.md")]
+
+use super::{
+    Case, Code, Correction, Evidence, Finding, Unit, Verdict, td201_focal_length::Measured,
+    td301_depth_scale::basis,
+};
+use crate::calibrate::Estimate;
+
+/// What makes zoom and shift observable.
+pub(super) const RECORD: &str = "Record 20 or more frames with the board tilted by 20 to 45 degrees to all sides, at \
+                                 0.2 m to 0.4 m: depth that does not vary over the image looks the same wherever it \
+                                 lies.";
+
+pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
+    let mut finding = Finding::new(Code::TD401, Unit::Percent);
+    finding.tolerance = Some(100.0 * case.tolerances.zoom);
+    let found = match basis(case, focal) {
+        Ok((found, _)) => found,
+        Err(why) => {
+            finding.summary = format!("Cannot tell whether depth is zoomed against colour: {why}.");
+            RECORD.clone_into(&mut finding.what_to_do);
+            return finding;
+        }
+    };
+    let zoom = found.zoom;
+    let deviation = Estimate { value: zoom.value - 1.0, sigma: zoom.sigma };
+    finding.verdict = Verdict::of(deviation, case.tolerances.zoom);
+    finding.value = Some(100.0 * deviation.value);
+    finding.sigma = Some(100.0 * deviation.sigma);
+    finding.evidence = vec![
+        Evidence::estimate("zoom", zoom),
+        Evidence::number("n_frames", found.n_frames as f64),
+        Evidence::number("n_patches", found.n_patches as f64),
+    ];
+    let words = match finding.verdict {
+        Verdict::Fault if deviation.value < 0.0 => {
+            "The depth map shows only the middle of the colour image"
+        }
+        Verdict::Fault => "The depth map shows more than the colour image",
+        Verdict::Info => "Depth and colour have the same zoom within the tolerance, if not exactly",
+        Verdict::Ok => "Depth and colour have the same zoom",
+        Verdict::Unknown | Verdict::Warning => "Cannot tell whether depth is zoomed against colour",
+    };
+    finding.summary = format!(
+        "{words}: {:.4} +- {:.4} of its width about the principal point (from the slopes of tilted views; {} patches \
+         in {} frames; tolerance {:.1} %).",
+        zoom.value,
+        zoom.sigma,
+        found.n_patches,
+        found.n_frames,
+        100.0 * case.tolerances.zoom,
+    );
+    match finding.verdict {
+        Verdict::Fault => {
+            finding.what_to_do = format!(
+                "Resample the depth map: the full depth image belongs on a rectangle of {:.4} times the colour image's \
+                 width and height, centred at the principal point. Until then depth lies up to {:.0} px beside its \
+                 colour.",
+                zoom.value,
+                edge_px(case, deviation.value)
+            );
+            finding.correction = Some(Correction::Align { zoom: zoom.value, shift_px: [0.0; 2] });
+        }
+        Verdict::Unknown | Verdict::Warning => RECORD.clone_into(&mut finding.what_to_do),
+        Verdict::Info | Verdict::Ok => {}
+    }
+    finding
+}
+
+/// How far the zoom moves the image's edge, pixels.
+fn edge_px(case: &Case<'_>, deviation: f64) -> f64 {
+    let half = case.size_px.map_or(320.0, |[width, _]| 0.5 * width as f64);
+    (deviation * half).abs()
+}

@@ -1,0 +1,81 @@
+#![doc = include_str!("td402_shift.md")]
+
+use super::{
+    Case, Code, Correction, Evidence, Finding, Unit, Verdict, td201_focal_length::Measured,
+    td301_depth_scale::basis, td401_zoom::RECORD,
+};
+use crate::calibrate::Estimate;
+
+pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
+    let mut finding = Finding::new(Code::TD402, Unit::Px);
+    let tolerance_px = case.tolerances.shift_px;
+    finding.tolerance = Some(tolerance_px);
+    let found = match basis(case, focal) {
+        Ok((found, _)) => found,
+        Err(why) => {
+            finding.summary =
+                format!("Cannot tell whether depth is shifted against colour: {why}.");
+            RECORD.clone_into(&mut finding.what_to_do);
+            return finding;
+        }
+    };
+    let [x, y] = found.shift_px;
+    let verdicts = found.shift_px.map(|axis| Verdict::of(axis, tolerance_px));
+    // The worse of both axes: a fault in one is a fault, and ok must mean both.
+    finding.verdict = verdicts.into_iter().min_by_key(severity).unwrap_or(Verdict::Unknown);
+    let length_px = x.value.hypot(y.value);
+    finding.value = Some(length_px);
+    finding.sigma = Some(sigma_along(&found.covariance, [x, y]));
+    finding.evidence = vec![
+        Evidence::estimate("shift_x_px", x),
+        Evidence::estimate("shift_y_px", y),
+        Evidence::number("n_frames", found.n_frames as f64),
+        Evidence::number("n_patches", found.n_patches as f64),
+    ];
+    let words = match finding.verdict {
+        Verdict::Fault => "Depth lies beside its colour",
+        Verdict::Info => "Depth lies on its colour within the tolerance, if not exactly",
+        Verdict::Ok => "Depth lies on its colour",
+        Verdict::Unknown | Verdict::Warning => {
+            "Cannot tell whether depth is shifted against colour"
+        }
+    };
+    finding.summary = format!(
+        "{words}: {:+.2} +- {:.2} px to the right, {:+.2} +- {:.2} px down (either axis judged by itself; {} patches \
+         in {} frames; tolerance {tolerance_px:.1} px).",
+        x.value, x.sigma, y.value, y.sigma, found.n_patches, found.n_frames,
+    );
+    match finding.verdict {
+        Verdict::Fault => {
+            finding.what_to_do =
+                "Shift the depth map back before depth is looked up at a colour pixel.".to_owned();
+            finding.correction =
+                Some(Correction::Align { zoom: 1.0, shift_px: [x.value, y.value] });
+        }
+        Verdict::Unknown | Verdict::Warning => RECORD.clone_into(&mut finding.what_to_do),
+        Verdict::Info | Verdict::Ok => {}
+    }
+    finding
+}
+
+/// Fault, then cannot tell, then info, then ok.
+fn severity(verdict: &Verdict) -> u8 {
+    match verdict {
+        Verdict::Fault => 0,
+        Verdict::Warning | Verdict::Unknown => 1,
+        Verdict::Info => 2,
+        Verdict::Ok => 3,
+    }
+}
+
+/// Standard deviation of the shift along itself, pixels.
+fn sigma_along(covariance: &[[f64; 5]; 5], [x, y]: [Estimate; 2]) -> f64 {
+    let length = x.value.hypot(y.value);
+    if !(length > 0.0) {
+        return x.sigma.max(y.sigma);
+    }
+    let (a, b) = (x.value / length, y.value / length);
+    let variance =
+        a * a * covariance[3][3] + 2.0 * a * b * covariance[3][4] + b * b * covariance[4][4];
+    variance.max(0.0).sqrt()
+}
