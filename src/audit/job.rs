@@ -2,18 +2,18 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use super::{Method, Options, Progress, Stage};
+use super::{
+    Method, Options, Progress, Stage,
+    conclude::{Ground, conclude},
+};
 use crate::{
     board::{CharucoBoard, Layout},
-    calibrate::{self, BoardSurface, Calibration, FrameCorners, RejectedFrame, Rejection},
-    camera::{Camera, Distortion},
-    depth::{
-        BoardDepth, Handedness, Patches, RegisterInput, Registration, against_board, handedness,
-        patches, register, sense,
-    },
-    detect::{Corner, Detector, Observation},
-    diagnose::{Case, Device, DistortionState, Finding, Verdict, diagnose},
-    pose::{View, Weighting},
+    calibrate::{Calibration, DistortionTest},
+    camera::Camera,
+    depth::{BoardDepth, Handedness, Patches, Registration},
+    detect::{Detector, Observation},
+    diagnose::{Device, DistortionState, Finding, Verdict},
+    pose::View,
     recording::{self, Factory, Problem, Recording},
 };
 
@@ -52,6 +52,8 @@ pub struct Audit {
     pub registration: Option<Registration>,
     /// Whether the depth maps are mirrored against the colour images; `None` where no pose of the board is known.
     pub handedness: Option<Handedness>,
+    /// How much of the lens' distortion is left in the stream, from the pixels; `None` where the views do not tell.
+    pub distortion: Option<DistortionTest>,
     /// Whether the stream still carries the lens' distortion.
     pub distortion_state: DistortionState,
     /// What follows, by code.
@@ -157,13 +159,6 @@ pub enum Error {
     },
 }
 
-/// Views with fewer corners are not compared: the paper's least number, too.
-const LEAST_CORNERS: usize = 9;
-
-/// What no corner is better than, pixels: the boards of the published recordings are uneven by 0.8 mm, which is a tenth
-/// of a pixel and more at their distance.
-const CORNER_FLOOR_PX: f64 = 0.1;
-
 /// Looks at everything. See [`audit_observed`] to be told how far it has come.
 ///
 /// Errors: a file that cannot be read or decoded, no board known, no colour image at all, colour and depth of different
@@ -180,86 +175,21 @@ pub fn audit_observed(
 ) -> Result<Audit, Error> {
     let place = || recording.place().to_owned();
     let board = options.board.as_ref().or(recording.board.as_ref());
-    let mut board = board.cloned().ok_or_else(|| Error::NoBoard { recording: place() })?;
+    let board = board.cloned().ok_or_else(|| Error::NoBoard { recording: place() })?;
     let n_frames = recording.frames.len();
     if recording.frames.iter().all(|f| f.color.is_none()) {
         return Err(Error::NoImages { recording: place(), n_frames });
     }
 
-    let mut frames = look(recording, &board, observer)?;
-    let layout = most_seen_layout(&frames);
-    board.layout = board.layout.or(layout);
-    let size_px = frames.iter().find_map(|f| f.size_px);
-    let factory = recording.factory().cloned();
-
-    observer(Progress { stage: Stage::Calibrate, done: 0, total: 1 });
-    let own = own_camera(recording, &options.method, &board, &frames)?;
-    observer(Progress { stage: Stage::Calibrate, done: 1, total: 1 });
-
-    observer(Progress { stage: Stage::Judge, done: 0, total: 1 });
-    for (index, (frame, source)) in frames.iter_mut().zip(&recording.frames).enumerate() {
-        let corners = &frame.observation.corners;
-        if corners.len() < LEAST_CORNERS {
-            continue;
-        }
-        let pinhole = source.factory.as_ref().or(factory.as_ref()).map(|f| f.intrinsics);
-        frame.factory_view = pinhole.and_then(|intrinsics| {
-            let camera = Camera { intrinsics, distortion: Distortion::None };
-            View::from_corners(index, &board, &camera, corners, Weighting::Equal).ok()
-        });
-        frame.own_view = own.view(index, &board, corners);
-    }
-    let factory_depth =
-        factory.is_some().then(|| compare(&board, None, &frames, |f| f.factory_view.as_ref()));
-    let own_depth = own
-        .camera
-        .is_some()
-        .then(|| compare(&board, own.surface(), &frames, |f| f.own_view.as_ref()));
-    let pairs = own.views_with_depth(&frames);
-    let registration = own.camera.as_ref().and_then(|camera| {
-        let calibration = own.calibration.as_ref();
-        register(&RegisterInput { board: &board, camera, calibration, views: &pairs })
-    });
-    let handedness = (!pairs.is_empty()).then(|| handedness(&board, own.surface(), &pairs));
-    drop(pairs);
-    let (findings, distortion_state) = diagnose(&Case {
+    let frames = look(recording, &board, observer)?;
+    let ground = Ground {
+        name: &recording.name,
+        place: recording.place(),
         problems: &recording.problems,
-        n_frames,
-        size_px,
-        factory: factory.as_ref(),
-        board: &board,
-        observations: &frames.iter().map(|f| &f.observation).collect::<Vec<_>>(),
-        calibration: own.calibration.as_ref(),
-        no_calibration: own.why_not.as_deref(),
-        camera: own.camera.as_ref(),
-        factory_views: &frames.iter().filter_map(|f| f.factory_view.as_ref()).collect::<Vec<_>>(),
-        own_views: &frames.iter().filter_map(|f| f.own_view.as_ref()).collect::<Vec<_>>(),
-        factory_depth: factory_depth.as_ref(),
-        own_depth: own_depth.as_ref(),
-        registration: registration.as_ref(),
-        handedness,
-        tolerances: options.tolerances,
-    });
-    observer(Progress { stage: Stage::Judge, done: 1, total: 1 });
-    Ok(Audit {
-        name: recording.name.clone(),
-        method: options.method.clone(),
-        device: Device::from_factory(factory.as_ref()),
-        board,
-        layout,
-        problems: recording.problems.clone(),
-        factory,
-        frames,
-        calibration: own.calibration,
-        no_calibration: own.why_not,
-        camera: own.camera,
-        factory_depth,
-        own_depth,
-        registration,
-        handedness,
-        distortion_state,
-        findings,
-    })
+        factory: recording.factory(),
+        factories: recording.frames.iter().map(|f| f.factory.as_ref()).collect(),
+    };
+    conclude(&ground, board, frames, options, observer)
 }
 
 /// Every frame: the image decoded, the corners detected, depth read at them, the image dropped.
@@ -297,17 +227,9 @@ fn look_at(
 ) -> Result<FrameAudit, Error> {
     let source = &recording.frames[index];
     let mut frame = FrameAudit {
-        timestamp: source.timestamp,
-        t_ns: source.t_ns,
         color: source.color.clone(),
         depth: source.depth.clone(),
-        size_px: None,
-        observation: Observation { corners: Vec::new(), identity: None, rejects: Vec::new() },
-        sensor_m: Vec::new(),
-        patches: None,
-        holes: None,
-        factory_view: None,
-        own_view: None,
+        ..FrameAudit::blank(source.timestamp, source.t_ns)
     };
     let Some(color) = &source.color else { return Ok(frame) };
     let gray = recording.gray(index)?;
@@ -329,178 +251,9 @@ fn look_at(
                 depth_size,
             });
         }
-        frame.sensor_m = sense(&map, &frame.observation.corners);
-        frame.patches = patches(&map, board, &frame.observation.corners);
-        let n_holes = map.depth_m().iter().filter(|depth| depth.is_nan()).count();
-        frame.holes = Some(n_holes as f64 / map.depth_m().len() as f64);
+        frame.read_depth(&map, board);
     }
     Ok(frame)
-}
-
-fn most_seen_layout(frames: &[FrameAudit]) -> Option<Layout> {
-    let count = |layout| {
-        frames
-            .iter()
-            .filter_map(|f| f.observation.identity.as_ref())
-            .filter(|i| i.layout == layout)
-            .count()
-    };
-    let (legacy, new) = (count(Layout::Legacy), count(Layout::New));
-    match legacy + new {
-        0 => None,
-        _ if new > legacy => Some(Layout::New),
-        _ => Some(Layout::Legacy),
-    }
-}
-
-fn compare<'a>(
-    board: &CharucoBoard,
-    surface: Option<&BoardSurface>,
-    frames: &'a [FrameAudit],
-    view: impl Fn(&'a FrameAudit) -> Option<&'a View>,
-) -> BoardDepth {
-    let sensed: Vec<_> = frames
-        .iter()
-        .filter(|frame| !frame.sensor_m.is_empty())
-        .filter_map(|frame| {
-            let view = view(frame)?;
-            // A view may have left out corners of the observation; both are in order of ids.
-            let mut seen = frame.observation.corners.iter().zip(&frame.sensor_m);
-            let sensor_m: Vec<_> = view
-                .corners
-                .iter()
-                .map(|corner| {
-                    seen.find(|(seen, _)| seen.id == corner.id).and_then(|(_, depth)| *depth)
-                })
-                .collect();
-            Some((view, sensor_m))
-        })
-        .collect();
-    let pairs: Vec<_> =
-        sensed.iter().map(|(view, sensor_m)| (*view, sensor_m.as_slice())).collect();
-    against_board(board, surface, &pairs)
-}
-
-/// The own camera, or why there is none.
-#[derive(Default)]
-struct Own {
-    camera: Option<Camera>,
-    calibration: Option<Calibration>,
-    why_not: Option<String>,
-}
-
-impl Own {
-    fn surface(&self) -> Option<&BoardSurface> {
-        self.calibration.as_ref().and_then(|c| c.surface.as_ref())
-    }
-
-    /// The views that the calibration found, or else those of `frames`, where there is depth.
-    fn views_with_depth<'a>(&'a self, frames: &'a [FrameAudit]) -> Vec<(&'a View, &'a Patches)> {
-        let views: Vec<&View> = match &self.calibration {
-            Some(calibration) => calibration.views.iter().collect(),
-            None if self.camera.is_some() => {
-                frames.iter().filter_map(|f| f.own_view.as_ref()).collect()
-            }
-            None => frames.iter().filter_map(|f| f.factory_view.as_ref()).collect(),
-        };
-        views
-            .into_iter()
-            .filter_map(|view| Some((view, frames[view.frame].patches.as_ref()?)))
-            .collect()
-    }
-
-    /// The board's pose in a frame with the own camera, corners left out that disagree with all others.
-    fn view(&self, index: usize, board: &CharucoBoard, corners: &[Corner]) -> Option<View> {
-        let camera = self.camera.as_ref()?;
-        let mut corners = corners.to_vec();
-        if let Some(calibration) = &self.calibration {
-            let disagrees = |r: &RejectedFrame| {
-                r.frame == index && matches!(r.reason, Rejection::Disagrees { .. })
-            };
-            if calibration.rejected.iter().any(disagrees) {
-                return None;
-            }
-            corners
-                .retain(|c| !calibration.outliers.iter().any(|o| o.frame == index && o.id == c.id));
-        }
-        let weighting = Weighting::Sigma { floor_px: CORNER_FLOOR_PX };
-        View::from_corners(index, board, camera, &corners, weighting).ok()
-    }
-}
-
-fn own_camera(
-    recording: &Recording,
-    method: &Method,
-    board: &CharucoBoard,
-    frames: &[FrameAudit],
-) -> Result<Own, Error> {
-    let size_px = frames.iter().find_map(|f| f.size_px);
-    let method = match method {
-        Method::Given(camera) => {
-            let given = [camera.intrinsics.width, camera.intrinsics.height];
-            if let Some(size) = size_px.filter(|size| *size != given) {
-                return Err(Error::CameraSize {
-                    recording: recording.place().to_owned(),
-                    given,
-                    size,
-                });
-            }
-            return Ok(Own { camera: Some((**camera).clone()), ..Own::default() });
-        }
-        Method::Paper => calibrate::Method::Paper,
-        Method::Auto => calibrate::Method::Auto,
-    };
-    let why_not = |why: String| Ok(Own { why_not: Some(why), ..Own::default() });
-    let frames: Vec<FrameCorners> = frames
-        .iter()
-        .enumerate()
-        .filter(|(_, frame)| !frame.observation.corners.is_empty())
-        .map(|(index, frame)| FrameCorners {
-            frame: index,
-            corners: frame.observation.corners.clone(),
-        })
-        .collect();
-    if frames.is_empty() {
-        return why_not("the board was not seen in any frame".to_owned());
-    }
-    let Some(factory) = recording.factory() else {
-        return why_not("the recording has no factory intrinsics to start from".to_owned());
-    };
-    let input = calibrate::Input {
-        board,
-        factory: &factory.intrinsics,
-        tables: factory.tables.as_ref(),
-        frames: &frames,
-    };
-    match calibrate::calibrate(&input, method) {
-        Ok(calibration) => Ok(Own {
-            camera: Some(calibration.camera.clone()),
-            calibration: Some(calibration),
-            why_not: None,
-        }),
-        Err(error) => why_not(why_not_calibrated(&error)),
-    }
-}
-
-/// For the end of a sentence. Findings tell the remedy themselves.
-fn why_not_calibrated(error: &calibrate::Error) -> String {
-    match error {
-        calibrate::Error::TooFewViews { n_frames, n_views, needed, min_corners } => format!(
-            "{n_views} of {n_frames} frames with the board are of use for a calibration (at least {min_corners} \
-             corners, spread in both directions, from a place of their own), and it takes {needed}"
-        ),
-        calibrate::Error::Underdetermined { n_views, n_pictures, max_tilt_deg, focal_px } => {
-            format!(
-                "the {n_views} views of the board ({n_pictures} different, tilted by at most {max_tilt_deg:.0} \
-                 degrees) do not determine a focal length{}",
-                focal_px.map_or(String::new(), |f| format!(
-                    ", which comes out as {:.0} +- {:.0} px",
-                    f.value, f.sigma
-                ))
-            )
-        }
-        other => other.to_string(),
-    }
 }
 
 #[cfg(test)]
@@ -509,7 +262,7 @@ mod tests {
 
     use super::*;
     use crate::{
-        camera::Intrinsics,
+        camera::{Distortion, Intrinsics},
         image::{DepthMap, Rgb},
         recording::{Limits, Memory, Writer},
     };

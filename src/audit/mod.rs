@@ -5,6 +5,8 @@
 //! decoded, looked at and dropped one by one, so that memory does not grow with the number of frames; with the
 //! feature `parallel` frames are looked at on all cores, with the same result bit by bit.
 //!
+//! [`audit_seen`] does the same from corners and depth maps that are known already.
+//!
 //! A recording in which no board is seen is not an error: the findings then say "cannot tell", and what to record.
 //!
 //! ```no_run
@@ -23,8 +25,10 @@
 //!
 //! Not here: reading arguments, printing, time; pictures and files ([`report`](crate::report)).
 
+mod conclude;
 mod job;
 mod options;
 
+pub use conclude::{Seen, audit_seen};
 pub use job::{Audit, Error, FrameAudit, audit, audit_observed};
 pub use options::{Method, Options, Progress, Stage};

@@ -26,6 +26,7 @@ pub(super) fn test(input: &Input<'_>, prepared: &Prepared) -> Option<DistortionT
             flat_rms_px: shape_rms_px(input, prepared, flat, &flat_fit),
             held_out_rms_px: prepared.held_out_rms_px(&fit),
             focal_px: fit.focal_px(),
+            center_px: [fit.estimate(1), fit.estimate(2)],
         });
         Some(fit)
     };

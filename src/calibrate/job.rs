@@ -1,7 +1,7 @@
 //! The calibration itself.
 
 use super::{
-    Calibration, Candidate, Error, Input, Method, Model, Parameter,
+    Calibration, Candidate, DistortionTest, Error, Input, Method, Model, Parameter,
     auto::{self, MAX_FOCAL_SIGMA, MIN_PICTURES, Prepared},
     distortion,
     fit::{Data, Fit, fit},
@@ -69,6 +69,12 @@ pub fn calibrate(input: &Input<'_>, method: Method) -> Result<Calibration, Error
             robust(input, method, model, prepared, &fit, candidates)
         }
     }
+}
+
+/// How much of the lens' distortion is left in the stream, as [`Method::Auto`] finds it beside its calibration; `None`
+/// where the views do not tell.
+pub fn distortion_test(input: &Input<'_>) -> Option<DistortionTest> {
+    distortion::test(input, &auto::prepare(input).ok()?)
 }
 
 /// All views and corners alike, no loss.

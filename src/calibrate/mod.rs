@@ -68,7 +68,7 @@ mod synthetic;
 #[cfg(test)]
 mod tests;
 
-pub use job::calibrate;
+pub use job::{calibrate, distortion_test};
 pub use model::Model;
 
 use crate::{
@@ -313,6 +313,8 @@ pub struct Hypothesis {
     pub held_out_rms_px: f64,
     /// Focal length under it.
     pub focal_px: Estimate,
+    /// Principal point under it.
+    pub center_px: [Estimate; 2],
 }
 
 /// What lies between the stream and a pinhole.

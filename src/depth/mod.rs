@@ -3,7 +3,11 @@
 //! Where the board is known to stand, the true depth of each of its corners is known too. [`sense`] reads a depth map
 //! at the corners as observed; [`against_board`] compares with the corners of the [`View`](crate::pose::View) of the
 //! same frame and gives a [`BoardDepth`]: an error per [`Sample`], a median per [`FrameDepth`], the mean of the
-//! medians, and a [`DepthLine`] (scale and bias of the sensor).
+//! medians, as the paper does it.
+//!
+//! [`patches`] keeps the board's whole surface of a depth map, and [`register`] takes those of all views to a
+//! [`Registration`]: scale and bias of the sensor, zoom and shift of the depth map against the colour image, with their
+//! covariance and the [`Pattern`] that is left. [`handedness`] tells a mirrored depth map.
 //!
 //! The sign is the paper's (arXiv:2201.10865, section 4.2): **error = board depth − sensor depth**, along the optical
 //! axis. Apple's depth maps are aligned with the colour image as it is, distorted or not, so the map is read at the
@@ -33,9 +37,7 @@
 //! Not here: verdicts ([`diagnose`](crate::diagnose)), images other than depth maps.
 
 mod against_board;
-mod clustered;
 mod handedness;
-mod line;
 mod patch;
 mod pattern;
 mod rays;
@@ -45,9 +47,7 @@ mod stance;
 
 pub(crate) use against_board::corner_on;
 pub use against_board::{BoardDepth, FrameDepth, MAX_ERROR_M, Sample, against_board, sense};
-pub(crate) use clustered::{Clustered, Equation};
 pub use handedness::{CornerDepth, Handedness, handedness};
-pub use line::DepthLine;
-pub use patch::{Patch, Patches, patches};
+pub use patch::{DepthSteps, Patch, Patches, patches};
 pub use pattern::{Holes, MAX_INCIDENCE_DEG, NEAR_M, Pattern, PatternCell};
 pub use register::{RegisterInput, Registration, register};

@@ -6,6 +6,7 @@ use crate::{
     detect::Corner,
     geom::{Homography, Pixel},
     image::DepthMap,
+    solve::median,
 };
 
 /// A small square of a depth map: one plane's worth of depth.
@@ -26,6 +27,26 @@ pub struct Patch {
     pub n_holes: usize,
 }
 
+/// In what steps a depth map is stored, on and round the board.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DepthSteps {
+    /// Distinct values, of some thousand pixels.
+    pub n_levels: usize,
+    /// The median difference of neighbouring values as a share of the median depth.
+    pub step_share: f64,
+}
+
+impl DepthSteps {
+    fn of(mut depths_m: Vec<f32>) -> Option<Self> {
+        depths_m.sort_by(f32::total_cmp);
+        let middle_m = *depths_m.get(depths_m.len() / 2)?;
+        depths_m.dedup();
+        let gaps: Vec<f64> = depths_m.windows(2).map(|w| f64::from(w[1] - w[0])).collect();
+        let step_m = if gaps.is_empty() { 0.0 } else { median(&gaps) };
+        Some(Self { n_levels: depths_m.len(), step_share: step_m / f64::from(middle_m) })
+    }
+}
+
 /// What a depth map says in and around the board's outline.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Patches {
@@ -35,6 +56,8 @@ pub struct Patches {
     pub measured: Vec<Patch>,
     /// Middles of the patches that have fewer, with the number of pixels without measurement.
     pub torn: Vec<(Pixel, usize)>,
+    /// In what steps depth is stored; `None` where nothing was measured.
+    pub steps: Option<DepthSteps>,
     /// Depth at the corners, straight and mirrored, by ascending id.
     pub corners: Vec<CornerDepth>,
 }
@@ -46,6 +69,8 @@ const PATCHES: f64 = 600.0;
 const RIM_SQUARES: f64 = 1.0;
 /// A pixel farther than so many standard deviations from its patch's plane does not count.
 const OUTLIER_SIGMAS: f64 = 4.0;
+/// Every so many pixels the stored value is noted.
+const LEVEL_STRIDE: usize = 8;
 /// Depth is quantised to 0.1 mm on disk; noise is never taken smaller.
 const LEAST_NOISE_M: f64 = 5e-5;
 
@@ -99,8 +124,10 @@ pub fn patches(map: &DepthMap, board: &CharucoBoard, corners: &[Corner]) -> Opti
         side_px,
         measured: Vec::new(),
         torn: Vec::new(),
+        steps: None,
         corners: corners.iter().map(read).collect(),
     };
+    let mut levels_m = Vec::new();
     let mut samples = Vec::with_capacity(side_px * side_px);
     // A grid fixed to the image, so that patches of all frames lie at the same places.
     for y in (top / side_px * side_px..height).step_by(side_px) {
@@ -117,8 +144,12 @@ pub fn patches(map: &DepthMap, board: &CharucoBoard, corners: &[Corner]) -> Opti
             samples.clear();
             for row in y..=y1 {
                 for column in x..=x1 {
-                    let depth_m = f64::from(map.at(column, row));
+                    let stored_m = map.at(column, row);
+                    let depth_m = f64::from(stored_m);
                     if depth_m > 0.0 {
+                        if (column + row).is_multiple_of(LEVEL_STRIDE) {
+                            levels_m.push(stored_m);
+                        }
                         let (dx, dy) = (column as f64 - middle.x, row as f64 - middle.y);
                         samples.push([dx, dy, depth_m.recip()]);
                     }
@@ -131,6 +162,7 @@ pub fn patches(map: &DepthMap, board: &CharucoBoard, corners: &[Corner]) -> Opti
             }
         }
     }
+    patches.steps = DepthSteps::of(levels_m);
     Some(patches)
 }
 

@@ -1,6 +1,6 @@
 //! Depth against colour, all views at once: scale, bias, zoom and shift of the sensor.
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{Cholesky, Matrix3, SMatrix, SVector, Vector3};
 
 use super::{
     Patch, Patches,
@@ -15,7 +15,7 @@ use crate::{
     camera::Camera,
     geom::Pixel,
     pose::View,
-    solve::{Cholesky, Reduced, classical, clustered, larger, mad_sigma},
+    solve::mad_sigma,
 };
 
 /// How the depth sensor stands to the colour camera and to the truth, from the board's whole surface in all views.
@@ -84,6 +84,7 @@ pub struct RegisterInput<'a> {
 
 const N: usize = 5;
 type Numbers = SVector<f64, N>;
+type Square = SMatrix<f64, N, N>;
 
 /// Scale, bias (m), zoom and shift (px) that no recording is farther from the truth than by about this: keeps what
 /// the views do not determine from running away. Weak beside any recording that tells anything.
@@ -375,7 +376,7 @@ fn noise_m(board_m: f64) -> f64 {
 /// The second level.
 struct Step {
     delta: Numbers,
-    covariance: [[f64; N]; N],
+    covariance: Square,
     /// What one σ of each of the camera's numbers does to the five.
     by_camera: Vec<Numbers>,
 }
@@ -386,18 +387,17 @@ fn between_frames(planes: &[Plane], theta: &Numbers) -> Option<Step> {
         .map(|i| 10f64.powf(f64::from(i) / 4.0))
         .filter_map(|ratio| Some((ratio, weigh(planes, theta, ratio)?.likelihood)))
         .fold((1.0, f64::NEG_INFINITY), |best, each| if each.1 > best.1 { each } else { best });
-    let Weighed { delta, all, parts, variance, weights, .. } = weigh(planes, theta, ratio)?;
-    let model = classical(&all, variance)?;
-    let covariance = clustered(&all, &parts).map_or(model, |c| larger(&model, &c));
+    let Weighed { delta, information, parts, variance, weights, .. } = weigh(planes, theta, ratio)?;
+    let inverse = Cholesky::new(information)?.inverse();
+    let covariance = larger(inverse * variance, leave_one_out(&information, &parts));
     let n_camera = planes.first().map_or(0, |p| p.by_camera.len());
-    let factor = Cholesky::new(&all.information)?;
     let by_camera = (0..n_camera)
         .map(|k| {
             let mut score = Numbers::zeros();
-            for (plane, (inverse, w)) in planes.iter().zip(&weights) {
-                score += plane.gain.transpose() * (inverse * plane.by_camera[k]) * *w;
+            for (plane, (precision, w)) in planes.iter().zip(&weights) {
+                score += plane.gain.transpose() * (precision * plane.by_camera[k]) * *w;
             }
-            -Numbers::from(factor.solve(&score.into()))
+            -(inverse * score)
         })
         .collect();
     Some(Step { delta, covariance, by_camera })
@@ -405,8 +405,9 @@ fn between_frames(planes: &[Plane], theta: &Numbers) -> Option<Step> {
 
 struct Weighed {
     delta: Numbers,
-    all: Reduced<N>,
-    parts: Vec<Reduced<N>>,
+    information: Square,
+    /// What each frame alone says: its information, and what it still asks for.
+    parts: Vec<(Square, Numbers)>,
     variance: f64,
     weights: Vec<(Matrix3<f64>, f64)>,
     likelihood: f64,
@@ -423,20 +424,23 @@ fn weigh(planes: &[Plane], theta: &Numbers, ratio: f64) -> Option<Weighed> {
     let mut weights = vec![1.0; planes.len()];
     let mut delta = Numbers::zeros();
     let mut variance = 1.0;
-    let mut all = Reduced::ZERO;
+    let mut information = Square::zeros();
     let start = Numbers::from([1.0, 0.0, 1.0, 0.0, 0.0]);
     for _ in 0..15 {
-        all = Reduced::ZERO;
+        information = Square::zeros();
+        let mut score = Numbers::zeros();
         for ((plane, (inverse, _)), w) in planes.iter().zip(&inverses).zip(&weights) {
-            all.add(&reduced(plane, inverse, *w, &plane.beta));
+            let weighted = plane.gain.transpose() * inverse * *w;
+            information += weighted * plane.gain;
+            score += weighted * plane.beta;
         }
         for k in 0..N {
             // The prior counts as data of variance κ².
             let precision = variance * PRIOR_SIGMA[k].powi(-2);
-            all.information[k][k] += precision;
-            all.score[k] += precision * (start[k] - theta[k]);
+            information[(k, k)] += precision;
+            score[k] += precision * (start[k] - theta[k]);
         }
-        delta = Numbers::from(Cholesky::new(&all.information)?.solve(&all.score));
+        delta = Cholesky::new(information)?.solve(&score);
         let squares: Vec<f64> = planes
             .iter()
             .zip(&inverses)
@@ -452,32 +456,39 @@ fn weigh(planes: &[Plane], theta: &Numbers, ratio: f64) -> Option<Weighed> {
         }
     }
     let determinants: f64 = inverses.iter().map(|(_, ln)| ln).sum();
-    let information = SMatrix::<f64, N, N>::from_fn(|i, j| {
-        all.information[i][j] * PRIOR_SIGMA[i] * PRIOR_SIGMA[j]
-    });
+    let scaled = Square::from_fn(|i, j| information[(i, j)] * PRIOR_SIGMA[i] * PRIOR_SIGMA[j]);
     let freedom = (3 * planes.len()) as f64 - N as f64;
-    let likelihood =
-        -0.5 * (determinants + information.determinant().ln() + freedom * variance.ln());
+    let likelihood = -0.5 * (determinants + scaled.determinant().ln() + freedom * variance.ln());
     let parts = planes
         .iter()
         .zip(&inverses)
         .zip(&weights)
         .map(|((plane, (inverse, _)), w)| {
-            reduced(plane, inverse, *w, &(plane.beta - plane.gain * delta))
+            let weighted = plane.gain.transpose() * inverse * *w;
+            (weighted * plane.gain, weighted * (plane.beta - plane.gain * delta))
         })
         .collect();
     let weights = inverses.into_iter().map(|(inverse, _)| inverse).zip(weights).collect();
-    Some(Weighed { delta, all, parts, variance, weights, likelihood })
+    Some(Weighed { delta, information, parts, variance, weights, likelihood })
 }
 
-fn reduced(plane: &Plane, inverse: &Matrix3<f64>, weight: f64, beta: &Vector3<f64>) -> Reduced<N> {
-    let weighted = plane.gain.transpose() * inverse * weight;
-    let information = weighted * plane.gain;
-    let score = weighted * beta;
-    Reduced {
-        information: std::array::from_fn(|i| std::array::from_fn(|j| information[(i, j)])),
-        score: score.into(),
+/// The covariance by leaving each frame out in turn (jackknife): whatever a frame's residuals have in common counts.
+/// `None` where a frame alone determines a number.
+fn leave_one_out(information: &Square, parts: &[(Square, Numbers)]) -> Option<Square> {
+    let n = parts.len() as f64;
+    let mut covariance = Square::zeros();
+    for (part, score) in parts {
+        let change = Cholesky::new(information - part)?.solve(score);
+        covariance.ger((n - 1.0) / n, &change, &change, 1.0);
     }
+    Some(covariance)
+}
+
+/// The correlations of the model, for each number the larger of both σ.
+fn larger(model: Square, other: Option<Square>) -> Square {
+    let Some(other) = other else { return model };
+    let factor = |i: usize| (other[(i, i)] / model[(i, i)]).sqrt().max(1.0);
+    Square::from_fn(|i, j| model[(i, j)] * factor(i) * factor(j))
 }
 
 fn assemble(
@@ -498,11 +509,12 @@ fn assemble(
                 continue;
             }
             for (i, j) in (0..N).flat_map(|i| (0..N).map(move |j| (i, j))) {
-                covariance[i][j] += correlation * step.by_camera[k][i] * step.by_camera[l][j];
+                covariance[(i, j)] += correlation * step.by_camera[k][i] * step.by_camera[l][j];
             }
         }
     }
-    let estimate = |k: usize| Estimate { value: theta[k], sigma: covariance[k][k].max(0.0).sqrt() };
+    let estimate =
+        |k: usize| Estimate { value: theta[k], sigma: covariance[(k, k)].max(0.0).sqrt() };
     let n_patches = planes.iter().map(|p| p.n_patches).sum::<usize>();
     let mut holes = Holes::default();
     let mut residuals = Vec::with_capacity(n_patches);
@@ -532,7 +544,7 @@ fn assemble(
         bias_m: estimate(1),
         zoom: estimate(2),
         shift_px: [estimate(3), estimate(4)],
-        covariance,
+        covariance: std::array::from_fn(|i| std::array::from_fn(|j| covariance[(i, j)])),
         center_m: planes.iter().map(|p| p.board_m[0]).sum::<f64>() / n_patches as f64,
         range_m: [
             planes.iter().map(|p| p.board_m[1]).fold(f64::INFINITY, f64::min),

@@ -1,15 +1,18 @@
 //! What a diagnosis starts from, and the order of the checks.
 
 use super::{
-    DistortionState, Finding, Tolerances, td101_files, td201_focal_length, td203_not_rectified,
-    td301_depth_scale, td302_depth_bias, td401_zoom, td402_shift, td403_mirrored,
-    td501_distortion_centre, td503_intrinsics_size, td504_field_of_view,
+    DistortionState, Finding, Tolerances, td101_files, td102_dropped_frames,
+    td103_metadata_incomplete, td104_depth_unit, td105_depth_not_metric, td201_focal_length,
+    td202_principal_point, td203_not_rectified, td204_rectified_twice, td205_factory_changed,
+    td301_depth_scale, td302_depth_bias, td303_depth_noise, td401_zoom, td402_shift,
+    td403_mirrored, td501_distortion_centre, td502_reference_dimensions, td503_intrinsics_size,
+    td504_field_of_view,
 };
 use crate::{
     board::CharucoBoard,
-    calibrate::{BoardSurface, Calibration},
+    calibrate::{Calibration, DistortionTest},
     camera::Camera,
-    depth::{BoardDepth, Handedness, Registration},
+    depth::{BoardDepth, DepthSteps, Handedness, Registration},
     detect::Observation,
     pose::View,
     recording::{Factory, Problem},
@@ -46,6 +49,12 @@ pub struct Case<'a> {
     pub own_depth: Option<&'a BoardDepth>,
     /// Depth against colour and truth with the own camera.
     pub registration: Option<&'a Registration>,
+    /// How much of the lens' distortion is left in the stream.
+    pub distortion: Option<&'a DistortionTest>,
+    /// In what steps depth is stored, for each frame with depth on the board.
+    pub steps: &'a [DepthSteps],
+    /// Time of each frame since the first, nanoseconds.
+    pub t_ns: &'a [i64],
     /// Whether the depth maps are mirrored against the colour images.
     pub handedness: Option<Handedness>,
     /// What still counts as true.
@@ -60,11 +69,6 @@ impl Case<'_> {
     /// Frames in which the board was seen.
     pub(super) fn n_seen(&self) -> usize {
         self.observations.iter().filter(|o| !o.corners.is_empty()).count()
-    }
-
-    /// The board's shape, where a calibration found it not flat.
-    pub(super) fn surface(&self) -> Option<&BoardSurface> {
-        self.calibration.and_then(|c| c.surface.as_ref())
     }
 
     /// Why nothing that rests on the own calibration is to be judged, for the end of a sentence; `None` where it fits.
@@ -91,20 +95,28 @@ impl Case<'_> {
 
 /// One finding per check, in order of their codes, and what they say about the stream's distortion.
 pub fn diagnose(case: &Case<'_>) -> (Vec<Finding>, DistortionState) {
-    let distortion = td203_not_rectified::measure(case);
-    let (not_rectified, state) = td203_not_rectified::check(case, distortion.as_ref());
+    let state = td203_not_rectified::state(case);
     // A focal length is comparable with the factory's only once the distortion is out of the way.
-    let focal = td201_focal_length::measure(case, distortion.as_ref(), state);
+    let focal = td201_focal_length::measure(case, state);
     let findings = vec![
         td101_files::check(case),
+        td102_dropped_frames::check(case),
+        td103_metadata_incomplete::check(case),
+        td104_depth_unit::check(case),
+        td105_depth_not_metric::check(case),
         td201_focal_length::check(case, focal.as_ref()),
-        not_rectified,
+        td202_principal_point::check(case, state),
+        td203_not_rectified::check(case, state),
+        td204_rectified_twice::check(case, state),
+        td205_factory_changed::check(case),
         td301_depth_scale::check(case, focal.as_ref()),
         td302_depth_bias::check(case, focal.as_ref()),
+        td303_depth_noise::check(case),
         td401_zoom::check(case, focal.as_ref()),
         td402_shift::check(case, focal.as_ref()),
         td403_mirrored::check(case),
         td501_distortion_centre::check(case),
+        td502_reference_dimensions::check(case),
         td503_intrinsics_size::check(case),
         td504_field_of_view::check(case),
     ];

@@ -38,14 +38,23 @@ macro_rules! codes {
 
 codes! {
     TD101, "td101_files", "Files and pairing";
+    TD102, "td102_dropped_frames", "Dropped frames";
+    TD103, "td103_metadata_incomplete", "Metadata";
+    TD104, "td104_depth_unit", "Unit of depth";
+    TD105, "td105_depth_not_metric", "Depth metric";
     TD201, "td201_focal_length", "Focal length";
+    TD202, "td202_principal_point", "Principal point";
     TD203, "td203_not_rectified", "Lens distortion in the images";
+    TD204, "td204_rectified_twice", "Rectified twice";
+    TD205, "td205_factory_changed", "Factory calibration changed";
     TD301, "td301_depth_scale", "Depth scale";
     TD302, "td302_depth_bias", "Depth bias";
+    TD303, "td303_depth_noise", "Depth noise and holes";
     TD401, "td401_zoom", "Depth-to-colour zoom";
     TD402, "td402_shift", "Depth-to-colour shift";
     TD403, "td403_mirrored", "Mirroring";
     TD501, "td501_distortion_centre", "Principal point and distortion centre";
+    TD502, "td502_reference_dimensions", "Reference dimensions";
     TD503, "td503_intrinsics_size", "Size the intrinsics are for";
     TD504, "td504_field_of_view", "Field of view";
 }

@@ -102,6 +102,11 @@ pub enum Correction {
         /// The true focal length at the image's size, pixels.
         focal_px: f64,
     },
+    /// Replace the principal point: metadata only, safe.
+    PrincipalPoint {
+        /// The true principal point at the image's size, pixels.
+        center_px: [f64; 2],
+    },
     /// Resample colour (and depth, never blending) to straight lines with Apple's forward table: changes the data.
     Undistort {
         /// The tables, where the recording has them; without, the own camera model has to be used.
@@ -134,11 +139,12 @@ pub enum Correction {
 }
 
 impl Correction {
-    /// `focal`, `undistort`, `depth`, `align`, `unmirror`, `unmirror_depth` or `scale_intrinsics`: stable, for
-    /// machines.
+    /// `focal`, `principal_point`, `undistort`, `depth`, `align`, `unmirror`, `unmirror_depth` or `scale_intrinsics`:
+    /// stable, for machines.
     pub const fn name(&self) -> &'static str {
         match self {
             Self::Focal { .. } => "focal",
+            Self::PrincipalPoint { .. } => "principal_point",
             Self::Undistort { .. } => "undistort",
             Self::Depth { .. } => "depth",
             Self::Align { .. } => "align",
@@ -150,7 +156,10 @@ impl Correction {
 
     /// True where images or depth maps change, false where only metadata do.
     pub const fn changes_data(&self) -> bool {
-        !matches!(self, Self::Focal { .. } | Self::ScaleIntrinsics { .. })
+        !matches!(
+            self,
+            Self::Focal { .. } | Self::PrincipalPoint { .. } | Self::ScaleIntrinsics { .. }
+        )
     }
 }
 
@@ -223,6 +232,8 @@ pub struct Tolerances {
     pub depth_bias_m: f64,
     /// Residual lens distortion at the corner of the image, pixels.
     pub distortion_px: f64,
+    /// Principal point against the factory's, along either axis, pixels.
+    pub principal_point_px: f64,
     /// Zoom of depth against colour, fraction.
     pub zoom: f64,
     /// Shift of depth against colour, along either axis, pixels.
@@ -232,13 +243,15 @@ pub struct Tolerances {
 impl Default for Tolerances {
     /// 1 % for focal length and depth scale (at 0.3 m, 3 mm: the sensor's own noise), 3 mm for the bias for the same
     /// reason, 1 px for distortion (a straight line is then still straight to the eye); 1 % for the zoom (3 px at the
-    /// image's edge) and 1 px for the shift: depth then belongs to its pixel or the next.
+    /// image's edge) and 1 px for the shift: depth then belongs to its pixel or the next; 2 px for the principal
+    /// point, which calibrations determine worst and lenses move by a pixel when they focus.
     fn default() -> Self {
         Self {
             focal: 0.01,
             depth_scale: 0.01,
             depth_bias_m: 0.003,
             distortion_px: 1.0,
+            principal_point_px: 2.0,
             zoom: 0.01,
             shift_px: 1.0,
         }

@@ -1,11 +1,10 @@
 #![doc = include_str!("td201_focal_length.md")]
 
-use super::{
-    Case, Code, Correction, DistortionState, Evidence, Finding, Unit, Verdict,
-    joint::{Freedom, joint},
-    td203_not_rectified,
+use super::{Case, Code, Correction, DistortionState, Evidence, Finding, Unit, Verdict};
+use crate::{
+    calibrate::{Estimate, Lens},
+    camera::Distortion,
 };
-use crate::{calibrate::Estimate, camera::Distortion};
 
 /// The focal length that this recording speaks for, with everything that makes it unsure.
 #[derive(Clone, Copy, Debug)]
@@ -18,8 +17,6 @@ pub(super) struct Measured {
     origin: Origin,
     /// From the fit's own covariance.
     formal_sigma_px: Option<f64>,
-    /// From the scatter between views and between parts of the board.
-    clustered_sigma_px: Option<f64>,
     /// Half the difference of both halves of the views.
     split_half_sigma_px: Option<f64>,
 }
@@ -52,11 +49,7 @@ enum Origin {
     Given,
 }
 
-pub(super) fn measure(
-    case: &Case<'_>,
-    distortion: Option<&td203_not_rectified::Measured<'_>>,
-    state: DistortionState,
-) -> Option<Measured> {
+pub(super) fn measure(case: &Case<'_>, state: DistortionState) -> Option<Measured> {
     let camera = case.camera?;
     let own_px = camera.intrinsics.focal_px();
     let Some(calibration) = case.calibration else {
@@ -65,37 +58,29 @@ pub(super) fn measure(
             own_px,
             origin: Origin::Given,
             formal_sigma_px: None,
-            clustered_sigma_px: None,
             split_half_sigma_px: None,
         });
     };
     let formal = calibration.parameter("focal_px").map(|f| f.sigma);
     // Each half has √2 the sigma of the whole, their difference twice: half of it is one draw of the whole's error.
     let split_half = calibration.split_half_focal_px.map(|[a, b]| (a.value - b.value).abs() / 2.0);
-    let pinhole = &camera.intrinsics;
     let bent = state == DistortionState::Distorted && camera.distortion == Distortion::None;
-    let taken_out = if bent { distortion.and_then(|d| d.focal_px(case, pinhole)) } else { None };
-    let (value, clustered, origin) = match taken_out {
-        Some(estimate) => (estimate.value, Some(estimate.sigma), Origin::DistortionTakenOut),
-        None => {
-            let views: Vec<_> = calibration.views.iter().collect();
-            let lens = |pixel| Some(camera.project_ray(pinhole.ray_from_pixel(pixel))? - pixel);
-            let freedom = match camera.distortion {
-                Distortion::None | Distortion::Table(_) => Freedom::Focal,
-                Distortion::Brown(_) => Freedom::CentreAndDistortion,
-            };
-            let spread = joint(case.board, case.surface(), &views, pinhole, &lens, freedom);
-            (own_px, spread.map(|j| j.focal_px.sigma), Origin::Own)
-        }
+    let straightened = || {
+        let hypotheses = &case.distortion?.hypotheses;
+        let under = |lens: Lens| hypotheses.iter().find(|h| h.lens == lens).map(|h| h.focal_px);
+        under(Lens::InverseTable).or_else(|| under(Lens::FreeRadial))
     };
-    // The worst of the three: each sees a kind of error that the others do not. With none of them nothing is known.
-    let sigma = [formal, clustered, split_half].into_iter().flatten().fold(f64::NAN, f64::max);
+    let (value, formal, origin) = match bent.then(straightened).flatten() {
+        Some(under) => (under.value, Some(under.sigma), Origin::DistortionTakenOut),
+        None => (own_px, formal, Origin::Own),
+    };
+    // The worse of both: halves see errors that vary over the recording. With neither nothing is known.
+    let sigma = [formal, split_half].into_iter().flatten().fold(f64::NAN, f64::max);
     Some(Measured {
         focal_px: Estimate { value, sigma },
         own_px,
         origin,
         formal_sigma_px: formal,
-        clustered_sigma_px: clustered,
         split_half_sigma_px: split_half,
     })
 }
@@ -106,6 +91,12 @@ pub(super) fn check(case: &Case<'_>, measured: Option<&Measured>) -> Finding {
     let record = "Record 20 or more frames moving round the board, tilted by 20 to 40 degrees in different directions: \
                   from fronto-parallel views alone focal length and distance cannot be told apart.";
     let factory_px = case.factory.map(|f| f.intrinsics.focal_px());
+    if let Some(why) = case.poor_fit() {
+        finding.summary =
+            format!("Cannot tell whether the factory's focal length is right: {why}.");
+        record.clone_into(&mut finding.what_to_do);
+        return finding;
+    }
     let (Some(measured), Some(factory_px)) = (measured, factory_px) else {
         finding.summary = if factory_px.is_none() {
             "Cannot tell whether the factory's focal length is right: the recording has no factory intrinsics."
@@ -131,7 +122,6 @@ pub(super) fn check(case: &Case<'_>, measured: Option<&Measured>) -> Finding {
     ];
     for (name, value) in [
         ("sigma_of_fit_px", measured.formal_sigma_px),
-        ("sigma_between_views_and_board_parts_px", measured.clustered_sigma_px),
         ("sigma_from_halves_px", measured.split_half_sigma_px),
     ] {
         finding.evidence.extend(value.map(|value| Evidence::number(name, value)));
@@ -139,14 +129,14 @@ pub(super) fn check(case: &Case<'_>, measured: Option<&Measured>) -> Finding {
     let how = match measured.origin {
         Origin::Given => "given from outside and taken as exact".to_owned(),
         Origin::Own => {
-            format!("measured against the board, sigma the largest of {}", measured.sigmas())
+            format!("measured against the board, sigma the larger of {}", measured.sigmas())
         }
         Origin::DistortionTakenOut => {
             finding
                 .evidence
                 .push(Evidence::number("focal_with_distortion_left_in_px", measured.own_px));
             format!(
-                "measured with the stream's distortion taken out ({:.2} px with it left in), sigma the largest of {}",
+                "measured with the stream's distortion taken out ({:.2} px with it left in), sigma the larger of {}",
                 measured.own_px,
                 measured.sigmas()
             )
@@ -190,7 +180,6 @@ impl Measured {
     fn sigmas(&self) -> String {
         [
             ("the fit's own", self.formal_sigma_px),
-            ("the scatter between views and board parts", self.clustered_sigma_px),
             ("half the difference of both halves", self.split_half_sigma_px),
         ]
         .into_iter()

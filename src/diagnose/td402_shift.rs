@@ -20,9 +20,8 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
         }
     };
     let [x, y] = found.shift_px;
-    let verdicts = found.shift_px.map(|axis| Verdict::of(axis, tolerance_px));
     // The worse of both axes: a fault in one is a fault, and ok must mean both.
-    finding.verdict = verdicts.into_iter().min_by_key(severity).unwrap_or(Verdict::Unknown);
+    finding.verdict = Verdict::of(x, tolerance_px).min(Verdict::of(y, tolerance_px));
     let length_px = x.value.hypot(y.value);
     finding.value = Some(length_px);
     finding.sigma = Some(sigma_along(&found.covariance, [x, y]));
@@ -56,16 +55,6 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
         Verdict::Info | Verdict::Ok => {}
     }
     finding
-}
-
-/// Fault, then cannot tell, then info, then ok.
-fn severity(verdict: &Verdict) -> u8 {
-    match verdict {
-        Verdict::Fault => 0,
-        Verdict::Warning | Verdict::Unknown => 1,
-        Verdict::Info => 2,
-        Verdict::Ok => 3,
-    }
 }
 
 /// Standard deviation of the shift along itself, pixels.

@@ -2,12 +2,17 @@
 
 use std::sync::LazyLock;
 
-use super::{Case, Code, Correction, DistortionState, Finding, Tolerances, Verdict, diagnose};
+use super::{
+    Case, Code, Correction, DistortionState, Finding, Tolerances, Verdict, diagnose,
+    factory_changed, reference_dimensions,
+};
 use crate::{
     board::{CharucoBoard, Layout},
+    calibrate::{FrameCorners, Input, distortion_test},
     camera::{Camera, Distortion, Intrinsics, RadialTable, TablePair},
     depth::{
-        BoardDepth, CornerDepth, Patch, Patches, RegisterInput, against_board, handedness, register,
+        BoardDepth, CornerDepth, DepthSteps, Patch, Patches, RegisterInput, against_board,
+        handedness, register,
     },
     detect::{Corner, Identity, Observation},
     geom::{Board, Color, Pixel, Pose, Rotation, Vector3},
@@ -52,6 +57,7 @@ struct World {
     zoom: f64,
     shift_px: [f64; 2],
     depth_mirrored: bool,
+    steps: DepthSteps,
     /// Smallest and largest distance of the board, metres.
     range_m: [f64; 2],
     mirrored: bool,
@@ -75,6 +81,7 @@ impl World {
             zoom: 1.0,
             shift_px: [0.0; 2],
             depth_mirrored: false,
+            steps: DepthSteps { n_levels: 1400, step_share: 0.0003 },
             range_m: [0.2, 0.45],
             mirrored: false,
             factory,
@@ -123,7 +130,7 @@ impl World {
                 CornerDepth { id: corner.id, straight_m, mirrored_m }
             })
             .collect();
-        Patches { side_px, measured, torn: Vec::new(), corners }
+        Patches { side_px, measured, torn: Vec::new(), steps: Some(self.steps), corners }
     }
 
     fn judge(&self) -> (Vec<Finding>, DistortionState) {
@@ -186,6 +193,16 @@ impl World {
         let registration = self.own.as_ref().and_then(|camera| {
             register(&RegisterInput { board: &BOARD, camera, calibration: None, views: &pairs })
         });
+        let frames: Vec<FrameCorners> = observations
+            .iter()
+            .enumerate()
+            .map(|(frame, o)| FrameCorners { frame, corners: o.corners.clone() })
+            .collect();
+        let distortion = self.own.as_ref().and_then(|_| {
+            let tables = self.factory.tables.as_ref();
+            let factory = &self.factory.intrinsics;
+            distortion_test(&Input { board: &BOARD, factory, tables, frames: &frames })
+        });
         diagnose(&Case {
             problems: &self.problems,
             n_frames: observations.len(),
@@ -201,6 +218,9 @@ impl World {
             factory_depth: Some(&factory_depth),
             own_depth: own_depth.as_ref(),
             registration: registration.as_ref(),
+            distortion: distortion.as_ref(),
+            steps: &[self.steps],
+            t_ns: &(0..20).map(|i| 500_000_000 * i).collect::<Vec<_>>(),
             handedness: Some(handedness(&BOARD, None, &pairs)),
             tolerances: Tolerances::default(),
         })
@@ -270,7 +290,8 @@ fn rectified_twice() {
     world.truth.distortion = Distortion::Table(TablePair::from_inverse(swapped));
     let (_, state) = world.judge();
     assert_eq!(state, DistortionState::RectifiedTwice);
-    assert_eq!(world.finding(Code::TD203).verdict, Verdict::Fault);
+    assert_eq!(world.faults(), [Code::TD204]);
+    assert!(world.finding(Code::TD204).value.unwrap() > 2.0);
 }
 
 #[test]
@@ -342,7 +363,7 @@ fn metadata_facts() {
     world.factory.distortion_center = Some(Pixel::new(318.9, 239.4));
     world.factory.field_of_view_rad = Some(0.9);
     world.problems = vec![Problem::MetadataWithoutImages { timestamps: vec![1, 2] }];
-    for (code, value) in [(Code::TD501, 0.4), (Code::TD504, 56.46), (Code::TD101, 1.0)] {
+    for (code, value) in [(Code::TD501, 0.4), (Code::TD504, 56.46), (Code::TD103, 1.0)] {
         let finding = world.finding(code);
         assert_eq!(finding.verdict, Verdict::Info, "{finding:?}");
         assert!((finding.value.unwrap() - value).abs() < 0.01, "{finding:?}");
@@ -386,4 +407,58 @@ fn a_mirrored_depth_map() {
     assert_eq!(finding.verdict, Verdict::Fault, "{finding:?}");
     assert_eq!(finding.correction, Some(Correction::UnmirrorDepth));
     assert_eq!(World::true_one().finding(Code::TD403).verdict, Verdict::Ok);
+}
+
+/// Each with the right finding, and no other.
+#[test]
+fn units_and_steps() {
+    let world = World { scale: 10.0, ..World::true_one() };
+    let finding = world.finding(Code::TD104);
+    assert_eq!(finding.verdict, Verdict::Fault, "{finding:?}");
+    assert_eq!(finding.correction, Some(Correction::Depth { scale: 10.0, bias_m: 0.0 }));
+
+    let steps = DepthSteps { n_levels: 180, step_share: 0.012 };
+    let world = World { steps, ..World::true_one() };
+    assert_eq!(world.finding(Code::TD105).verdict, Verdict::Warning);
+    assert_eq!(world.faults(), []);
+
+    // Something that falls where depth grows.
+    let world = World { scale: -0.5, bias_m: 0.4, ..World::true_one() };
+    assert_eq!(world.finding(Code::TD105).verdict, Verdict::Fault);
+}
+
+#[test]
+fn a_wrong_principal_point() {
+    let mut world = World::true_one();
+    world.factory.intrinsics.cx += 6.0;
+    let finding = world.finding(Code::TD202);
+    assert_eq!(finding.verdict, Verdict::Fault, "{finding:?}");
+    let Some(Correction::PrincipalPoint { center_px: [x, y] }) = finding.correction else {
+        panic!("{finding:?}")
+    };
+    assert!((x - 318.9).abs() < 1.0 && (y - 239.8).abs() < 1.0, "{finding:?}");
+}
+
+/// What the paper's tables of metadata say, device by device.
+#[test]
+fn two_recordings() {
+    let factory = |width: f64, focal_px: f64| {
+        let mut factory = Factory::pinhole(pinhole(focal_px * 640.0 / width));
+        factory.reference_dimensions = Some([width, 0.75 * width]);
+        factory
+    };
+    let first_issue = reference_dimensions(&factory(3088.0, 2872.5), &factory(3248.0, 2872.5));
+    assert_eq!(first_issue.verdict, Verdict::Warning);
+    let zoom = first_issue.evidence.iter().find(|e| e.name == "expected_zoom").unwrap().value;
+    assert!((zoom - 0.9507).abs() < 1e-4);
+    let second = reference_dimensions(&factory(2016.0, 1781.8), &factory(2880.0, 1916.2));
+    assert!(second.summary.contains("TD201"), "{second:?}");
+    let iphone = reference_dimensions(&factory(4032.0, 2751.0), &factory(4032.0, 2751.0));
+    assert_eq!(iphone.verdict, Verdict::Ok);
+
+    let change =
+        |focal_px| factory_changed(&factory(2016.0, 1781.78), &factory(2016.0, focal_px)).verdict;
+    assert_eq!(change(1781.78), Verdict::Ok);
+    assert_eq!(change(1780.13), Verdict::Info); // iOS 15 on the 12.9-inch 5th generation
+    assert_eq!(change(1916.17), Verdict::Warning);
 }

@@ -53,12 +53,13 @@ pub(super) fn audit() -> Audit {
         problems: vec![Problem::MetadataWithoutImages { timestamps: vec![100_500, 101_000] }],
         factory: Some(factory),
         camera: Some(calibration.camera.clone()),
-        calibration: Some(calibration),
         no_calibration: None,
         factory_depth: Some(depth(|f| f.factory_view.as_ref())),
         own_depth: Some(depth(|f| f.own_view.as_ref())),
         registration: None,
         handedness: None,
+        distortion: calibration.distortion.clone(),
+        calibration: Some(calibration),
         distortion_state: DistortionState::Rectified,
         findings: findings(),
         frames,
@@ -162,6 +163,7 @@ fn calibration(frames: &[FrameAudit]) -> Calibration {
         flat_rms_px: rms_px,
         held_out_rms_px: 1.07 * rms_px,
         focal_px,
+        center_px: [estimate(320.9, 0.6), estimate(240.3, 0.5)],
     };
     Calibration {
         method: calibrate::Method::Auto,

@@ -46,6 +46,7 @@ mod plan;
 
 mod device;
 mod fault;
+mod glimpse;
 mod trajectory;
 
 mod scene;
@@ -61,6 +62,7 @@ mod truth;
 
 pub use device::{Device, Stream, UnknownDevice};
 pub use fault::{Fault, FaultError, Faults};
+pub use glimpse::Glimpse;
 pub use plan::{Plan, SimulatedFrame};
 pub use render::{Rendered, render};
 pub use scene::{Handedness, Light, Motion, Noise, Polarity, Print, Scene, Tone, TrueCorner};

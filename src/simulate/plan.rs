@@ -220,21 +220,26 @@ impl Plan {
     pub fn frame(&self, frame: usize) -> SimulatedFrame {
         let scene = self.scene(frame);
         let mut color = render_frame(&scene, self.seed, frame).image;
-        let mut depth = measure_frame(&scene, &self.sensor_with_faults(), self.seed, frame);
+        let depth = measure_frame(&scene, &self.sensor_with_faults(), self.seed, frame);
         if self.is_mirrored() {
             let pixels = mirrored(color.width(), color.pixels());
             color = Rgb::new(color.width(), color.height(), pixels);
         }
-        if self.is_mirrored() != self.is_depth_mirrored() {
-            let depth_m = mirrored(depth.width(), depth.depth_m());
-            depth = DepthMap::new(depth.width(), depth.height(), depth_m);
-        }
         SimulatedFrame {
             timestamp: self.timestamp(frame),
             color,
-            depth,
+            depth: self.as_recorded(depth),
             corners: self.corners(&scene),
         }
+    }
+
+    /// The depth map as it comes out of the device: mirrored where it is.
+    pub(super) fn as_recorded(&self, depth: DepthMap) -> DepthMap {
+        if self.is_mirrored() == self.is_depth_mirrored() {
+            return depth;
+        }
+        let depth_m = mirrored(depth.width(), depth.depth_m());
+        DepthMap::new(depth.width(), depth.height(), depth_m)
     }
 
     /// What is true of the recording.

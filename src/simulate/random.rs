@@ -10,6 +10,7 @@ pub(super) enum Subject {
     Wall = 2,
     Image = 3,
     Depth = 4,
+    Corners = 5,
 }
 
 /// One stream of random numbers.

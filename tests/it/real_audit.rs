@@ -85,7 +85,7 @@ fn ipad_4th_generation_is_not_rectified() {
             evidence.iter().find(|e| e.name == name).expect("named evidence").value
         };
         let (rectified_px, distorted_px) =
-            (number("rms_as_rectified_px"), number("rms_as_distorted_px"));
+            (number("rms_as_rectified_px"), number("rms_with_inverse_table_px"));
         assert!(distorted_px < 0.65 * rectified_px, "{rectified_px} px, {distorted_px} px");
         // Once the table is applied the factory's focal length is right.
         let focal = finding(&audit, Code::TD201);

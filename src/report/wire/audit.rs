@@ -230,7 +230,7 @@ pub struct EvidenceInfo {
 /// What would make the data true.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CorrectionInfo {
-    /// `focal`, `undistort`, `depth`, `align`, `unmirror`, `unmirror_depth` or `scale_intrinsics`.
+    /// `focal`, `principal_point`, `undistort`, `depth`, `align`, `unmirror`, `unmirror_depth` or `scale_intrinsics`.
     pub kind: String,
     /// Whether images or depth maps change, not only metadata.
     pub changes_data: bool,
@@ -456,6 +456,9 @@ impl From<&diagnose::Correction> for CorrectionInfo {
             diagnose::Correction::Focal { focal_px } => vec![("focal_px", *focal_px)],
             diagnose::Correction::Depth { scale, bias_m } => {
                 vec![("scale", *scale), ("bias_mm", 1e3 * bias_m)]
+            }
+            diagnose::Correction::PrincipalPoint { center_px: [x, y] } => {
+                vec![("center_x_px", *x), ("center_y_px", *y)]
             }
             diagnose::Correction::Align { zoom, shift_px: [x, y] } => {
                 vec![("zoom", *zoom), ("shift_x_px", *x), ("shift_y_px", *y)]

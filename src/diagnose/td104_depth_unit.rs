@@ -1,0 +1,60 @@
+#![doc = include_str!("td104_depth_unit.md")]
+
+use super::{Case, Code, Correction, Evidence, Finding, Unit, Verdict};
+use crate::solve::{mad_sigma, median};
+
+/// Samples that make a median.
+const LEAST_SAMPLES: usize = 20;
+/// No focal length is wrong by so much; no unit differs from metres by less.
+const FAR_OFF: f64 = 3.0;
+
+pub(super) fn check(case: &Case<'_>) -> Finding {
+    let mut finding = Finding::new(Code::TD104, Unit::Count);
+    let depth = case.own_depth.or(case.factory_depth);
+    let ratios: Vec<f64> = depth
+        .iter()
+        .flat_map(|d| &d.frames)
+        .flat_map(|f| &f.samples)
+        .map(|s| (s.sensor_m / s.board_m).ln())
+        .filter(|ln| ln.is_finite())
+        .collect();
+    if ratios.len() < LEAST_SAMPLES {
+        finding.summary =
+            "Cannot tell the unit of depth: it was hardly measured on the board.".to_owned();
+        finding.what_to_do = "Record the board at 0.2 m to 0.4 m with depth.".to_owned();
+        return finding;
+    }
+    let middle = median(&ratios);
+    let ratio = middle.exp();
+    finding.value = Some(ratio);
+    finding.evidence = vec![
+        Evidence::number("sensor_over_board", ratio),
+        Evidence::number("scatter_of_the_ratio_percent", 100.0 * mad_sigma(&ratios, middle)),
+        Evidence::number("n_samples", ratios.len() as f64),
+    ];
+    if ratio < FAR_OFF && ratio > FAR_OFF.recip() {
+        finding.verdict = Verdict::Ok;
+        finding.summary = format!(
+            "Depth is in metres: on the board the sensor says {ratio:.3} times the board's depth."
+        );
+        return finding;
+    }
+    finding.verdict = Verdict::Fault;
+    let power = ratio.log10().round();
+    let unit = 10f64.powf(power);
+    finding.summary = format!(
+        "Depth is in the wrong unit: on the board the sensor says {ratio:.3} times the board's depth (median of {} \
+         samples; no camera is wrong by a factor of {FAR_OFF:.0}).",
+        ratios.len()
+    );
+    finding.what_to_do = if power == 0.0 {
+        "Find out what the numbers count: the factor is no power of ten. Check the size of the board's squares, too."
+    } else {
+        "Divide depth by the power of ten, or tell the reader the unit. Check the size of the board's squares, too."
+    }
+    .to_owned();
+    if power != 0.0 {
+        finding.correction = Some(Correction::Depth { scale: unit, bias_m: 0.0 });
+    }
+    finding
+}

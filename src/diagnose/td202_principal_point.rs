@@ -1,0 +1,79 @@
+#![doc = include_str!("td202_principal_point.md")]
+
+use super::{Case, Code, Correction, DistortionState, Evidence, Finding, Unit, Verdict};
+use crate::calibrate::{Estimate, Lens};
+
+/// The principal point, free, under what is in the stream.
+fn measured(case: &Case<'_>, state: DistortionState) -> Option<[Estimate; 2]> {
+    let lens = match (state, case.factory?.tables.is_some()) {
+        (DistortionState::Distorted, true) => Lens::InverseTable,
+        (DistortionState::Distorted, false) => Lens::FreeRadial,
+        (DistortionState::Rectified, _) => Lens::None,
+        (DistortionState::RectifiedTwice, _) => Lens::ForwardTable,
+        (DistortionState::Unknown, _) => return None,
+    };
+    case.distortion?.hypotheses.iter().find(|h| h.lens == lens).map(|h| h.center_px)
+}
+
+pub(super) fn check(case: &Case<'_>, state: DistortionState) -> Finding {
+    let mut finding = Finding::new(Code::TD202, Unit::Px);
+    let tolerance_px = case.tolerances.principal_point_px;
+    finding.tolerance = Some(tolerance_px);
+    let record = "Record 20 or more frames with the board tilted by 20 to 45 degrees to all sides and turned in the \
+                  image by 90 degrees in some of them.";
+    let factory = case.factory.map(|f| [f.intrinsics.cx, f.intrinsics.cy]);
+    let measured = measured(case, state).filter(|_| case.poor_fit().is_none());
+    let (Some(own), Some(factory)) = (measured, factory) else {
+        let why = match case.poor_fit() {
+            Some(why) => why,
+            None if factory.is_none() => "the recording has no factory intrinsics".to_owned(),
+            None if case.camera.is_some() => "the distortion of the stream is not known".to_owned(),
+            None => case.why_no_camera(),
+        };
+        finding.summary =
+            format!("Cannot tell whether the factory's principal point is right: {why}.");
+        record.clone_into(&mut finding.what_to_do);
+        return finding;
+    };
+    let off = [0, 1].map(|i| Estimate { value: own[i].value - factory[i], sigma: own[i].sigma });
+    // The worse of both axes: a fault in one is a fault, and ok must mean both.
+    finding.verdict = Verdict::of(off[0], tolerance_px).min(Verdict::of(off[1], tolerance_px));
+    let length_px = off[0].value.hypot(off[1].value);
+    finding.value = Some(length_px);
+    // Along its own direction, both axes taken as independent.
+    let share = |i: usize| if length_px > 0.0 { off[i].value / length_px } else { 0.5f64.sqrt() };
+    finding.sigma = Some((share(0) * off[0].sigma).hypot(share(1) * off[1].sigma));
+    finding.evidence = vec![
+        Evidence::estimate("center_x_px", own[0]),
+        Evidence::estimate("center_y_px", own[1]),
+        Evidence::number("factory_center_x_px", factory[0]),
+        Evidence::number("factory_center_y_px", factory[1]),
+    ];
+    let words = match finding.verdict {
+        Verdict::Fault => "The factory's principal point is wrong",
+        Verdict::Info => {
+            "The factory's principal point is right within the tolerance, if not exactly"
+        }
+        Verdict::Ok => "The factory's principal point is right",
+        Verdict::Unknown | Verdict::Warning => {
+            "Cannot tell whether the factory's principal point is right"
+        }
+    };
+    finding.summary = format!(
+        "{words}: ({:.2} +- {:.2}, {:.2} +- {:.2}) px instead of ({:.2}, {:.2}) px (either axis judged by itself; \
+         tolerance {tolerance_px:.1} px).",
+        own[0].value, own[0].sigma, own[1].value, own[1].sigma, factory[0], factory[1],
+    );
+    match finding.verdict {
+        Verdict::Fault => {
+            finding.what_to_do =
+                "Use the measured principal point together with the measured focal length."
+                    .to_owned();
+            finding.correction =
+                Some(Correction::PrincipalPoint { center_px: [own[0].value, own[1].value] });
+        }
+        Verdict::Unknown | Verdict::Warning => record.clone_into(&mut finding.what_to_do),
+        Verdict::Info | Verdict::Ok => {}
+    }
+    finding
+}

@@ -1,0 +1,69 @@
+#![doc = include_str!("td303_depth_noise.md")]
+
+use super::{Case, Code, Evidence, Finding, Unit, Verdict};
+
+/// Share of holes within the sensor's reach beyond which a recording is short of depth, percent.
+const MANY_HOLES_PERCENT: f64 = 10.0;
+/// Noise of single pixels of a sound sensor: σ² = floor² + (z²·growth)², measured on the published recordings.
+const FLOOR_M: f64 = 0.17e-3;
+const GROWTH_PER_M: f64 = 2.2e-3;
+/// So many times that is no sound sensor's noise.
+const MUCH: f64 = 4.0;
+
+pub(super) fn check(case: &Case<'_>) -> Finding {
+    let mut finding = Finding::new(Code::TD303, Unit::Percent);
+    finding.tolerance = Some(MANY_HOLES_PERCENT);
+    let record = "Record the board at 0.2 m to 0.4 m, not too slantingly, without direct sunlight.";
+    let Some(found) = case.registration else {
+        finding.summary = "Cannot tell how noisy depth is: no own camera, or too few frames with depth on the board."
+            .to_owned();
+        record.clone_into(&mut finding.what_to_do);
+        return finding;
+    };
+    let pattern = &found.pattern;
+    let expected_m = FLOOR_M.hypot(found.center_m * found.center_m * GROWTH_PER_M);
+    let times = pattern.pixel_noise_m / expected_m;
+    let holes = &pattern.holes;
+    let share = holes.share_in_reach();
+    finding.value = share.map(|share| 100.0 * share);
+    finding.evidence = vec![
+        Evidence::number("pixel_noise_mm", 1e3 * pattern.pixel_noise_m),
+        Evidence::number("pixel_noise_of_a_sound_sensor_mm", 1e3 * expected_m),
+        Evidence::number("frame_to_frame_mm", 1e3 * pattern.frame_noise_m),
+        Evidence::number("same_in_all_frames_mm", 1e3 * pattern.fixed_m),
+        Evidence::number("n_pixels_on_board", holes.n_pixels as f64),
+        Evidence::number("n_holes_on_board", holes.n_holes as f64),
+        Evidence::number("n_pixels_in_reach", holes.n_pixels_in_reach as f64),
+        Evidence::number("n_holes_in_reach", holes.n_holes_in_reach as f64),
+    ];
+    let numbers = format!(
+        "single pixels scatter by {:.2} mm about small planes ({times:.1} times what a sound sensor does at {:.2} m), \
+         places of the image by {:.2} mm from frame to frame, and {:.2} mm stay in all frames",
+        1e3 * pattern.pixel_noise_m,
+        found.center_m,
+        1e3 * pattern.frame_noise_m,
+        1e3 * pattern.fixed_m,
+    );
+    let noisy = times > MUCH;
+    let torn = share.is_some_and(|share| 100.0 * share > MANY_HOLES_PERCENT);
+    let gaps = share.map_or_else(
+        || "the board was never within 0.2 m and 60 degrees".to_owned(),
+        |share| format!("{:.2} % of the pixels on the board within reach are holes", 100.0 * share),
+    );
+    finding.summary = format!(
+        "{}: {numbers}; {gaps}.",
+        match (noisy, torn) {
+            (true, _) => "Depth is noisier than a sound sensor's",
+            (false, true) => "Depth has many holes",
+            (false, false) => "Depth is as noisy as a sound sensor's",
+        }
+    );
+    (finding.verdict, finding.what_to_do) = match (noisy || torn, share) {
+        (true, _) => {
+            (Verdict::Warning, format!("Clean the front glass, and look for sunlight. {record}"))
+        }
+        (false, None) => (Verdict::Unknown, record.to_owned()),
+        (false, Some(_)) => (Verdict::Ok, String::new()),
+    };
+    finding
+}

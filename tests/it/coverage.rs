@@ -1,0 +1,84 @@
+//! A small version of `cargo run --release --example coverage`: are the uncertainties true?
+
+use truedepth::{
+    audit::{Audit, Method, Options, Seen, audit_seen},
+    calibrate::Estimate,
+    diagnose::{Code, Verdict},
+    simulate::{Device, Faults, Plan, Stream},
+};
+
+fn judged(device: &str, seed: u64, faults: &[&str]) -> (Plan, Audit) {
+    let mut plan = Plan::new(Device::named(device).expect("is known"), seed);
+    plan.faults = Faults::parse(faults.iter().copied()).expect("can be");
+    plan.n_frames = 15;
+    let factory = plan.factory();
+    let seen = (0..plan.n_frames).map(|frame| {
+        let glimpse = plan.glimpse(frame);
+        Seen {
+            t_ns: 500_000_000 * frame as i64,
+            size_px: [640, 480],
+            observation: glimpse.observation,
+            depth: Some(glimpse.depth),
+        }
+    });
+    let options = Options { board: Some(plan.board.clone()), ..Options::new(Method::Auto) };
+    let audit = audit_seen("simulated", Some(&factory), seen.collect(), &options).expect("audits");
+    (plan, audit)
+}
+
+fn faults(audit: &Audit) -> Vec<Code> {
+    audit.findings.iter().filter(|f| f.verdict == Verdict::Fault).map(|f| f.code).collect()
+}
+
+/// Twelve sound recordings: no false fault, and errors of the size their sigmas say. The mean square of twelve normal
+/// numbers lies between 0.29 and 2.4 in 99.8 % of cases; the sigmas may be somewhat too large, hence 0.15.
+#[test]
+fn sigmas_and_verdicts_of_sound_recordings() {
+    let mut squares = [0.0; 6];
+    let n = 12;
+    for i in 0..n {
+        let device = ["ipad-12.9-5gen", "ipad-12.9-4gen", "iphone-13"][i % 3];
+        let wavy: &[&str] = if i % 2 == 1 { &["bent=0.8mm"] } else { &[] };
+        let (plan, audit) = judged(device, 50 + i as u64, wavy);
+        let distorted = plan.stream() == Stream::Distorted;
+        let expected = if distorted { vec![Code::TD203] } else { Vec::new() };
+        assert_eq!(faults(&audit), expected, "{device} {i}");
+        let focal = audit.calibration.as_ref().expect("calibrates").focal_px();
+        let found = audit.registration.as_ref().expect("registers");
+        let [x, y] = found.shift_px;
+        let z = |e: Estimate, truth: f64| ((e.value - truth) / e.sigma).powi(2);
+        let each = [
+            z(focal, plan.true_camera().intrinsics.fx),
+            z(found.scale, 1.0),
+            z(found.bias_m, 0.0),
+            z(found.zoom, 1.0),
+            z(x, 0.0),
+            z(y, 0.0),
+        ];
+        for (sum, z2) in squares.iter_mut().zip(each) {
+            *sum += z2 / n as f64;
+        }
+    }
+    let names = ["focal", "scale", "bias", "zoom", "shift x", "shift y"];
+    for (name, mean) in names.iter().zip(squares) {
+        assert!((0.15..2.4).contains(&mean), "{name}: {squares:?}");
+    }
+}
+
+/// Everything wrong with the depth at once, and each told for itself.
+#[test]
+fn faults_of_depth_are_told_apart() {
+    let wrong = ["depth-zoom=0.9507", "depth-shift=3px,-2px", "depth-scale=1.5%", "depth-bias=5mm"];
+    let (_, audit) = judged("ipad-12.9-5gen", 3, &wrong);
+    assert_eq!(faults(&audit), [Code::TD301, Code::TD302, Code::TD401, Code::TD402]);
+    let found = audit.registration.expect("registers");
+    assert!((1.0 - found.zoom.value) / found.zoom.sigma > 10.0, "{:?}", found.zoom);
+    let [x, y] = found.shift_px;
+    for (estimate, truth) in
+        [(found.zoom, 0.9507), (x, 3.0), (y, -2.0), (found.scale, 1.015), (found.bias_m, 0.005)]
+    {
+        assert!((estimate.value - truth).abs() < 4.0 * estimate.sigma, "{truth}: {estimate:?}");
+    }
+    let (_, audit) = judged("ipad-12.9-5gen", 4, &["depth-mirrored"]);
+    assert!(faults(&audit).contains(&Code::TD403), "{:?}", audit.handedness);
+}
