@@ -3,7 +3,8 @@
 //! An [`Audit`](crate::audit::Audit) leaves in three forms that say the same. [`wire`] is the versioned form for
 //! programs, written by [`to_json`]; [`summary`] is what a person reads in ten seconds on a terminal, as lines of
 //! [`Span`]s with a [`Tone`] each; [`page`] is one HTML file with the verdicts first and the evidence behind them,
-//! with a few of the recording's images ([`Photo`]) and what the detector saw in them ([`Overlay`]).
+//! with the recording's [`Pictures`]: photos ([`Photo`]) with what the detector saw in them ([`Overlay`]), and a few
+//! frames with their depth ([`Closeup`]) to lay over each other and to turn in space.
 //! [`sheet_pdf`], [`sheet_svg`] and [`sheet_png`] are the printed target.
 //!
 //! The page loads nothing from anywhere, and every string that came out of a file is escaped on the way into it.
@@ -30,6 +31,7 @@ mod html;
 mod json;
 mod overlay;
 mod photo;
+mod pictures;
 mod sheet;
 mod svg;
 mod text;
@@ -40,9 +42,10 @@ mod words;
 mod sample;
 
 pub use error::Error;
-pub use html::{frames_to_show, page};
+pub use html::page;
 pub use json::to_json;
 pub use overlay::Overlay;
-pub use photo::Photo;
+pub use photo::{Photo, PhotoSize};
+pub use pictures::{Closeup, Pictures};
 pub use sheet::{sheet_image, sheet_pdf, sheet_png, sheet_svg};
 pub use text::{Line, Span, Tone, summary};

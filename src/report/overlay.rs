@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use super::svg::n;
+use super::svg::tenth;
 use crate::{
     board::CharucoBoard,
     detect::Observation,
@@ -68,12 +68,12 @@ impl Overlay {
                 }
                 g class="overlay-corners" {
                     @for (_, pixel) in &self.corners {
-                        circle cx=(n(pixel.x)) cy=(n(pixel.y)) r=(n(3.5 * unit)) {}
+                        circle cx=(tenth(pixel.x)) cy=(tenth(pixel.y)) r=(tenth(3.5 * unit)) {}
                     }
                 }
-                g class="overlay-ids" font-size=(n(11.0 * unit)) {
+                g class="overlay-ids" font-size=(tenth(11.0 * unit)) {
                     @for (id, pixel) in &self.corners {
-                        text x=(n(pixel.x + 5.0 * unit)) y=(n(pixel.y - 5.0 * unit)) { (id) }
+                        text x=(tenth(pixel.x + 5.0 * unit)) y=(tenth(pixel.y - 5.0 * unit)) { (id) }
                     }
                 }
             }
@@ -170,11 +170,14 @@ fn markers(
 }
 
 fn points(outline: &[Pixel]) -> String {
-    outline.iter().map(|p| format!("{},{}", n(p.x), n(p.y))).collect::<Vec<_>>().join(" ")
+    outline.iter().map(|p| format!("{},{}", tenth(p.x), tenth(p.y))).collect::<Vec<_>>().join(" ")
 }
 
 fn segments(segments: &[[Pixel; 2]]) -> String {
-    segments.iter().map(|[a, b]| format!("M{} {}L{} {}", n(a.x), n(a.y), n(b.x), n(b.y))).collect()
+    segments
+        .iter()
+        .map(|[a, b]| format!("M{} {}L{} {}", tenth(a.x), tenth(a.y), tenth(b.x), tenth(b.y)))
+        .collect()
 }
 
 fn crosses(at: &[Pixel], radius: f64) -> String {

@@ -2,13 +2,27 @@
 
 use jpeg_encoder::{ColorType, Encoder};
 
-use crate::{
-    image::Rgb,
-    recording::{self, Recording},
-};
+use crate::image::Rgb;
 
-/// Images wider than this are made smaller by a whole factor.
-const MAX_WIDTH: usize = 800;
+/// How large a photo is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PhotoSize {
+    /// To look at a corner: at most 800 pixels wide.
+    Large,
+    /// To see which frame it is and whether the board was found: at most 320 pixels wide.
+    Small,
+}
+
+impl PhotoSize {
+    /// Images wider than this are made smaller by a whole factor.
+    const fn max_width(self) -> usize {
+        match self {
+            Self::Large => 800,
+            Self::Small => 320,
+        }
+    }
+}
+
 /// Of 100. Print edges stay clean; a 640x480 image takes some 30 kB.
 const JPEG_QUALITY: u8 = 72;
 
@@ -24,33 +38,9 @@ pub struct Photo {
 }
 
 impl Photo {
-    /// Reads the colour image of a frame and makes it small.
-    ///
-    /// Errors: as [`Recording::rgb`].
-    pub fn read(recording: &Recording, frame: usize) -> Result<Self, recording::Error> {
-        Ok(Self::new(frame, &recording.rgb(frame)?))
-    }
-
-    /// Reads the colour images of several frames, on all cores where the feature `parallel` is on.
-    ///
-    /// Errors: as [`Recording::rgb`], of the first frame that has one.
-    pub fn read_all(
-        recording: &Recording,
-        frames: &[usize],
-    ) -> Result<Vec<Self>, recording::Error> {
-        #[cfg(feature = "parallel")]
-        let photos: Vec<_> = {
-            use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
-            frames.par_iter().map(|&frame| Self::read(recording, frame)).collect()
-        };
-        #[cfg(not(feature = "parallel"))]
-        let photos: Vec<_> = frames.iter().map(|&frame| Self::read(recording, frame)).collect();
-        photos.into_iter().collect()
-    }
-
     /// The photo of an image. Panics where the image has no pixels.
-    pub fn new(frame: usize, image: &Rgb) -> Self {
-        let small = shrunk(image, image.width().div_ceil(MAX_WIDTH));
+    pub fn new(frame: usize, image: &Rgb, size: PhotoSize) -> Self {
+        let small = shrunk(image, size.max_width());
         let mut jpeg = Vec::new();
         let side = |pixels: usize| {
             u16::try_from(pixels).expect("a shrunk image is at most 65535 pixels a side")
@@ -72,11 +62,12 @@ impl Photo {
     }
 }
 
-/// The mean of blocks of `factor` × `factor` pixels, incomplete blocks dropped. Values are averaged as stored: for a
+/// The image at most so wide: the mean of square blocks of pixels, incomplete blocks dropped. Values are averaged as stored: for a
 /// thumbnail the difference to linear light cannot be seen.
-fn shrunk(image: &Rgb, factor: usize) -> Rgb {
+fn shrunk(image: &Rgb, max_width: usize) -> Rgb {
     // A very tall image is made smaller by more than its width asks for, down to at least one pixel.
-    let factor = factor.max(image.height().div_ceil(4 * MAX_WIDTH)).max(1);
+    let factor =
+        image.width().div_ceil(max_width).max(image.height().div_ceil(4 * max_width)).max(1);
     let (width, height) = ((image.width() / factor).max(1), (image.height() / factor).max(1));
     if factor == 1 {
         return image.clone();
@@ -102,7 +93,7 @@ fn shrunk(image: &Rgb, factor: usize) -> Rgb {
 }
 
 /// RFC 4648, section 4.
-fn base64(bytes: &[u8]) -> String {
+pub(super) fn base64(bytes: &[u8]) -> String {
     const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
     for chunk in bytes.chunks(3) {
@@ -142,10 +133,10 @@ mod tests {
     fn large_images_shrink_by_whole_factors() {
         let image =
             Rgb::new(1601, 3, (0..1601 * 3).map(|i| [(i % 1601 / 3 * 3 % 256) as u8; 3]).collect());
-        let small = shrunk(&image, 3);
+        let small = shrunk(&image, 534);
         assert_eq!((small.width(), small.height()), (533, 1));
         assert_eq!(small.pixels()[7], [21; 3]);
-        let photo = Photo::new(4, &image);
+        let photo = Photo::new(4, &image, PhotoSize::Large);
         assert_eq!(photo.size_px, (1601, 3));
         assert_eq!(&photo.jpeg[..3], &[0xff, 0xd8, 0xff]);
         assert!(photo.data_uri().starts_with("data:image/jpeg;base64,/9j/"));
@@ -154,7 +145,11 @@ mod tests {
     #[test]
     fn extreme_shapes() {
         for (width, height) in [(1, 1), (1, 200_000), (900, 1)] {
-            let photo = Photo::new(0, &Rgb::new(width, height, vec![[9; 3]; width * height]));
+            let photo = Photo::new(
+                0,
+                &Rgb::new(width, height, vec![[9; 3]; width * height]),
+                PhotoSize::Small,
+            );
             assert_eq!(photo.size_px, (width, height));
         }
     }

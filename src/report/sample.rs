@@ -1,7 +1,7 @@
 //! A small audit made by hand for the tests of this room: an iPad whose factory focal length is 6.6 % too long, seen
 //! in twelve frames. All randomness is a fixed sequence.
 
-use super::photo::Photo;
+use super::{Closeup, Photo, PhotoSize, Pictures};
 use crate::{
     audit::{Audit, FrameAudit, Method},
     board::{CharucoBoard, Layout},
@@ -16,7 +16,7 @@ use crate::{
         Code, Correction, Device, DistortionState, Evidence, Finding, Sensor, Unit, Verdict,
     },
     geom::{Board, Color, Pixel, Pose, Rotation, Vector3},
-    image::Rgb,
+    image::{DepthMap, Rgb},
     pose::View,
     recording::{Factory, Problem},
 };
@@ -67,11 +67,15 @@ pub(super) fn audit() -> Audit {
     }
 }
 
-/// Grey pictures for the gallery.
-pub(super) fn photos() -> Vec<Photo> {
+/// Grey pictures, and a depth map.
+pub(super) fn pictures() -> Pictures {
     let pixels = (0..64 * 48).map(|i| [(i % 64 * 4) as u8; 3]).collect();
     let image = Rgb::new(64, 48, pixels);
-    [0, 7].map(|frame| Photo { size_px: (640, 480), ..Photo::new(frame, &image) }).to_vec()
+    let photo =
+        |frame| Photo { size_px: (640, 480), ..Photo::new(frame, &image, PhotoSize::Large) };
+    let map =
+        DepthMap::new(640, 480, (0..640 * 480).map(|i| 0.2 + 1e-4 * (i % 640) as f32).collect());
+    Pictures { photos: [0, 7].map(photo).to_vec(), closeups: vec![Closeup::new(7, &map)] }
 }
 
 fn intrinsics(focal_px: f64) -> Intrinsics {

@@ -14,6 +14,11 @@ pub(super) fn n(value: f64) -> String {
     format!("{}", if value == 0.0 { 0.0 } else { value }) // Not −0.
 }
 
+/// As [`n`], to a tenth of a unit: for marks laid over an image's pixels, of which there are thousands.
+pub(super) fn tenth(value: f64) -> String {
+    n((value * 10.0).round() / 10.0)
+}
+
 /// Takes values to coordinates, linearly.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scale {

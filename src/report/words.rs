@@ -240,6 +240,75 @@ pub(super) fn explain_command(finding: &Finding) -> String {
     format!("truedepth explain {}", finding.code)
 }
 
+/// What to type next, and what for.
+pub(super) fn next_commands(_audit: &Audit, finding: &Finding) -> Vec<(String, &'static str)> {
+    vec![(explain_command(finding), "Read more")]
+}
+
+/// A summary without the test that it ends with in parentheses, and the test.
+pub(super) fn sentence_and_test(summary: &str) -> (String, Option<String>) {
+    let parts = summary.strip_suffix(").").and_then(|rest| rest.rsplit_once(" ("));
+    match parts {
+        Some((sentence, test)) if !test.contains(')') => {
+            (format!("{sentence}."), Some(format!("{test}.")))
+        }
+        _ => (summary.to_owned(), None),
+    }
+}
+
+/// How far the value is from what ought to be, in σ and in tolerances; nothing where it is no estimate.
+pub(super) fn how_sure(finding: &Finding) -> Option<String> {
+    let size = finding.value.filter(|value| value.is_finite())?.abs();
+    let sigma = finding.sigma.filter(|sigma| sigma.is_finite() && *sigma > 0.0)?;
+    let times = |ratio: f64| if ratio < 10.0 { plain(ratio, 1) } else { plain(ratio, 0) };
+    let mut text = format!("{} σ from what ought to be", times(size / sigma));
+    if let Some(tolerance) = finding.tolerance.filter(|t| t.is_finite() && *t > 0.0) {
+        let bound = format!("±{} {}", trimmed(tolerance, 3), unit(finding.unit));
+        text += &if size > tolerance {
+            format!(", and {} times the tolerance of {bound}", times(size / tolerance))
+        } else {
+            format!("; the tolerance of {bound} is {} σ wide", times(tolerance / sigma))
+        };
+    }
+    Some(text + ". A fault asks for more than 3 σ and more than the tolerance.")
+}
+
+/// The frames that a check rests on; `None` where it rests on metadata alone or on none.
+pub(super) fn frames_behind(audit: &Audit, code: Code) -> Option<Vec<usize>> {
+    let depth = || {
+        let depth = audit.own_depth.as_ref().or(audit.factory_depth.as_ref())?;
+        let used = depth.frames.iter().filter(|frame| frame.median_error_m.is_some());
+        Some(used.map(|frame| frame.frame).collect())
+    };
+    let views = || Some(audit.calibration.as_ref()?.views.iter().map(|v| v.frame).collect());
+    let seen = || {
+        let is_seen = |frame: &usize| audit.frames[*frame].observation.identity.is_some();
+        Some((0..audit.frames.len()).filter(is_seen).collect())
+    };
+    let frames: Vec<usize> = match code {
+        Code::TD201 | Code::TD203 => views(),
+        Code::TD301 | Code::TD302 => depth(),
+        Code::TD403 => seen(),
+        _ => None,
+    }?;
+    (!frames.is_empty()).then_some(frames)
+}
+
+/// Ascending numbers with runs drawn together: `0–4, 7, 9`.
+pub(super) fn ranges(numbers: &[usize]) -> String {
+    let mut runs: Vec<[usize; 2]> = Vec::new();
+    for &number in numbers {
+        match runs.last_mut() {
+            Some([_, last]) if *last + 1 == number => *last = number,
+            _ => runs.push([number; 2]),
+        }
+    }
+    let words = runs.into_iter().map(|[first, last]| {
+        if first == last { first.to_string() } else { format!("{first}–{last}") }
+    });
+    words.collect::<Vec<_>>().join(", ")
+}
+
 /// A model as people say it.
 pub(super) const fn model(model: Model) -> &'static str {
     match model {
@@ -368,6 +437,31 @@ mod tests {
         ] {
             assert_eq!(value_and_sigma(Estimate { value, sigma }, 3), expected);
         }
+    }
+
+    #[test]
+    fn what_speaks_for_a_verdict() {
+        let (sentence, test) = sentence_and_test("It is 3 (not 4) long (by a ruler; tolerance 1).");
+        assert_eq!(sentence, "It is 3 (not 4) long.");
+        assert_eq!(test.as_deref(), Some("by a ruler; tolerance 1."));
+        assert_eq!(sentence_and_test("No test."), ("No test.".to_owned(), None));
+        assert_eq!(sentence_and_test("(a) (b))."), ("(a) (b)).".to_owned(), None));
+        assert_eq!(ranges(&[0, 1, 2, 5, 7, 8]), "0–2, 5, 7–8");
+        assert_eq!(ranges(&[]), "");
+
+        let mut finding = Finding::new(Code::TD201, Unit::Percent);
+        (finding.value, finding.sigma, finding.tolerance) = (Some(-6.2), Some(0.05), Some(1.0));
+        let words = how_sure(&finding).expect("an estimate");
+        assert!(
+            words.starts_with("124 σ from what ought to be, and 6.2 times the tolerance of ±1 %")
+        );
+        finding.value = Some(0.1);
+        let words = how_sure(&finding).expect("an estimate");
+        assert!(
+            words.starts_with("2.0 σ from what ought to be; the tolerance of ±1 % is 20 σ wide")
+        );
+        finding.sigma = None;
+        assert_eq!(how_sure(&finding), None);
     }
 
     #[test]

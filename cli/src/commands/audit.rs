@@ -8,7 +8,7 @@ use std::{
 use truedepth::{
     audit::{Audit, Method, Options, Progress, audit_observed},
     recording::{Found, Recording},
-    report::{self, Photo, wire},
+    report::{self, Pictures, wire},
 };
 
 use crate::{
@@ -145,8 +145,7 @@ pub(crate) fn observed(
     Ok(audit?)
 }
 
-/// The report as a page, with a few of the recording's images.
+/// The report as a page, with the recording's images.
 pub(crate) fn page(recording: &Recording, audit: &Audit) -> Result<String, Failure> {
-    let photos = Photo::read_all(recording, &report::frames_to_show(audit))?;
-    Ok(report::page(audit, &photos))
+    Ok(report::page(audit, &Pictures::read(recording, audit)?))
 }

@@ -1,30 +1,37 @@
 //! The page: verdicts first, then the figures, then the frames, then how it was made. One file that loads nothing.
 
+mod closeups;
+mod findings;
 mod gallery;
+mod script;
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-pub use gallery::frames_to_show;
-
+use self::{findings::chip, script::SCRIPT};
 use super::{
     figures::{self, Figure},
-    photo::Photo,
+    pictures::Pictures,
     words,
 };
-use crate::{
-    audit::Audit,
-    diagnose::{Correction, Finding, Verdict},
-};
+use crate::audit::Audit;
 
 /// Nothing may be loaded, from anywhere: images come as `data:`, style and script stand in the page.
 const POLICY: &str = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'; \
                       base-uri 'none'; form-action 'none'";
 
-/// The report as one HTML file, with these images in its gallery (see [`frames_to_show`] for which to read).
+/// The report as one HTML file, with these pictures of the recording; without any it is the numbers alone.
 ///
-/// Everything that comes out of a file is escaped. The same audit and photos give the same bytes.
-pub fn page(audit: &Audit, photos: &[Photo]) -> String {
+/// Everything that comes out of a file is escaped. The same audit and pictures give the same bytes.
+pub fn page(audit: &Audit, pictures: &Pictures) -> String {
     let title = format!("{} · truedepth audit", audit.name);
+    let closeups = closeups::closeups(audit, pictures);
+    let gallery = gallery::gallery(audit, &pictures.photos);
+    let evidence = evidence(audit);
+    let mut parts = vec![("findings", "Findings"), ("numbers", "Numbers")];
+    parts.extend(closeups.as_ref().map(|_| ("closer", "Look")));
+    parts.extend(evidence.iter().filter(|e| !e.3.is_empty()).map(|(id, name, ..)| (*id, *name)));
+    parts.extend(gallery.as_ref().map(|_| ("frames", "Frames")));
+    parts.push(("method", "Method"));
     let markup = html! {
         (DOCTYPE)
         html lang="en" {
@@ -39,32 +46,33 @@ pub fn page(audit: &Audit, photos: &[Photo]) -> String {
             }
             body {
                 a class="skip" href="#findings" { "Skip to the findings" }
-                (header(audit))
+                (header(audit, &parts))
                 main {
-                    (verdicts(audit))
+                    (findings::findings(audit))
                     (quantities(audit))
-                    @for (question, figures) in evidence(audit) {
+                    @if let Some(closeups) = closeups { (closeups) }
+                    @for (id, _, question, figures) in evidence {
                         @if !figures.is_empty() {
-                            section class="evidence" {
+                            section class="evidence" id=(id) {
                                 h2 { (question) }
                                 div class="figures" { @for figure in figures { (figure.to_html()) } }
                             }
                         }
                     }
-                    (gallery::gallery(audit, photos))
+                    @if let Some(gallery) = gallery { (gallery) }
                     (files(audit))
                 }
                 (footer(audit))
                 div id="tip" role="status" aria-live="polite" hidden {}
-                script { (PreEscaped(include_str!("report.js"))) }
+                script { (PreEscaped(SCRIPT)) }
             }
         }
     };
     markup.into_string()
 }
 
-/// The figures, by the question they answer.
-fn evidence(audit: &Audit) -> [(&'static str, Vec<Figure>); 3] {
+/// The figures, by the question they answer: id, name in the list of parts, question, figures.
+fn evidence(audit: &Audit) -> [(&'static str, &'static str, &'static str, Vec<Figure>); 3] {
     let depth = figures::depth_histograms(audit)
         .into_iter()
         .chain(figures::error_histogram(audit))
@@ -74,13 +82,23 @@ fn evidence(audit: &Audit) -> [(&'static str, Vec<Figure>); 3] {
         [figures::focal_lengths(audit), figures::rms_by_lens(audit), figures::rms_by_model(audit)];
     let trust = [figures::residual_field(audit), figures::rms_by_view(audit)];
     [
-        ("Is the depth true?", depth.collect()),
-        ("Is the camera what the factory says?", camera.into_iter().flatten().collect()),
-        ("Can the measurement be trusted?", trust.into_iter().flatten().collect()),
+        ("depth", "Depth", "Is the depth true?", depth.collect()),
+        (
+            "camera",
+            "Camera",
+            "Is the camera what the factory says?",
+            camera.into_iter().flatten().collect(),
+        ),
+        (
+            "trust",
+            "Trust",
+            "Can the measurement be trusted?",
+            trust.into_iter().flatten().collect(),
+        ),
     ]
 }
 
-fn header(audit: &Audit) -> Markup {
+fn header(audit: &Audit, parts: &[(&str, &str)]) -> Markup {
     html! {
         header class="top" {
             div class="bar" {
@@ -90,161 +108,16 @@ fn header(audit: &Audit) -> Markup {
             h1 { (audit.name) }
             p class="device" { (words::camera_line(audit)) }
             p class="board" { (words::board_line(audit)) }
-        }
-    }
-}
-
-fn verdicts(audit: &Audit) -> Markup {
-    let (verdict, headline) = words::headline(audit);
-    let findings = words::by_severity(audit);
-    let (loud, quiet): (Vec<&Finding>, Vec<&Finding>) = findings
-        .into_iter()
-        .partition(|f| matches!(f.verdict, Verdict::Fault | Verdict::Warning | Verdict::Unknown));
-    html! {
-        section id="findings" aria-labelledby="headline" {
-            p id="headline" class=(format!("headline {}", verdict.name())) { (headline) }
-            @for finding in &loud { (full_finding(finding)) }
-            @if !quiet.is_empty() {
-                ul class="quiet" {
-                    @for finding in &quiet {
-                        li {
-                            (chip(finding.verdict))
-                            span class="code" { (finding.code) }
-                            div {
-                                strong { (finding.title()) ". " } (words::unbroken(&finding.summary))
-                                @if !finding.what_to_do.is_empty() { " " (words::unbroken(&finding.what_to_do)) }
-                            }
-                        }
-                    }
-                }
+            nav aria-label="Parts of this page" {
+                @for (id, words) in parts { a href=(format!("#{id}")) { (words) } " " }
             }
         }
     }
-}
-
-/// Colour, shape and word say the same.
-fn chip(verdict: Verdict) -> Markup {
-    let path = match verdict {
-        Verdict::Fault => "M4 4L12 12M12 4L4 12",
-        Verdict::Warning => "M8 3V9M8 12.2V12.8",
-        Verdict::Unknown => "M5.5 6A2.5 2.5 0 1 1 8 8.6V9.4M8 12.2V12.8",
-        Verdict::Info => "M8 7V13M8 3.4V4",
-        Verdict::Ok => "M3.5 8.5L6.8 11.8L12.5 4.8",
-    };
-    html! {
-        span class=(format!("chip {}", verdict.name())) {
-            svg viewBox="0 0 16 16" aria-hidden="true" { path d=(path) {} }
-            (words::verdict_word(verdict))
-        }
-    }
-}
-
-fn full_finding(finding: &Finding) -> Markup {
-    let difference = words::difference(finding);
-    html! {
-        article class=(format!("finding {}", finding.verdict.name())) id=(finding.code.name()) {
-            header {
-                (chip(finding.verdict))
-                h2 { (finding.title()) }
-                span class="code" { (finding.code) }
-            }
-            div class="measure" {
-                @if !difference.is_empty() { p class="value" { (difference) } }
-                @if let Some(gauge) = figures::finding_gauge(finding) { (gauge) }
-            }
-            div class="words" {
-                p class="summary" { (words::unbroken(&finding.summary)) }
-                @if !finding.what_to_do.is_empty() {
-                    p class="to-do" { strong { "What to do. " } (words::unbroken(&finding.what_to_do)) }
-                }
-                @if let Some(correction) = &finding.correction {
-                    p class="correction" {
-                        strong { "What would make it true. " }
-                        (words::unbroken(&correction_words(correction)))
-                    }
-                }
-                p class="command" {
-                    "Read more: " code { (words::explain_command(finding)) }
-                    button type="button" class="copy" data-copy=(words::explain_command(finding)) hidden { "Copy" }
-                }
-                @if !finding.evidence.is_empty() { (evidence_table(finding)) }
-            }
-        }
-    }
-}
-
-fn evidence_table(finding: &Finding) -> Markup {
-    html! {
-        details class="data" {
-            summary { "The numbers behind it" }
-            div class="scroll" tabindex="0" role="region" aria-label="The numbers behind it" {
-                table {
-                    thead { tr { th scope="col" { "quantity" } th scope="col" { "value" } th scope="col" { "σ" } } }
-                    tbody {
-                        @for evidence in &finding.evidence {
-                            tr {
-                                td { (evidence.name.replace('_', " ")) }
-                                td { (words::trimmed(evidence.value, 4)) }
-                                td { (evidence.sigma.map_or(String::new(), |sigma| words::trimmed(sigma, 4))) }
-                            }
-                        }
-                    }
-                }
-            }
-        }
-    }
-}
-
-/// What a correction does, in a sentence.
-fn correction_words(correction: &Correction) -> String {
-    let what = match correction {
-        Correction::Focal { focal_px } => {
-            format!(
-                "Use a focal length of {} px at the size of these images.",
-                words::plain(*focal_px, 2)
-            )
-        }
-        Correction::PrincipalPoint { center_px: [x, y] } => format!(
-            "Use the principal point ({}, {}) px at the size of these images.",
-            words::plain(*x, 2),
-            words::plain(*y, 2)
-        ),
-        Correction::Undistort { tables: Some(_) } => {
-            "Resample the images to straight lines with the tables of this recording.".to_owned()
-        }
-        Correction::Undistort { tables: None } => {
-            "Resample the images to straight lines with the own camera model.".to_owned()
-        }
-        Correction::Depth { scale, bias_m } => format!(
-            "Take {} mm from every depth, then divide it by {}.",
-            words::plain(1e3 * bias_m, 2),
-            words::plain(*scale, 5)
-        ),
-        Correction::Align { zoom, shift_px: [x, y] } => format!(
-            "Resample depth to colour: zoom {}, shift {} px to the right and {} px down.",
-            words::plain(*zoom, 4),
-            words::plain(*x, 2),
-            words::plain(*y, 2)
-        ),
-        Correction::Unmirror => "Mirror the images back.".to_owned(),
-        Correction::UnmirrorDepth => "Mirror the depth maps back.".to_owned(),
-        Correction::ScaleIntrinsics { factor: [x, y] } => format!(
-            "Multiply fx and cx by {}, fy and cy by {}.",
-            words::trimmed(*x, 5),
-            words::trimmed(*y, 5)
-        ),
-    };
-    let kind = if correction.changes_data() {
-        "It changes the images or the depth."
-    } else {
-        "It changes metadata only."
-    };
-    format!("{what} {kind}")
 }
 
 fn quantities(audit: &Audit) -> Markup {
     html! {
-        section class="quantities" aria-labelledby="quantities-title" {
+        section class="quantities" id="numbers" aria-labelledby="quantities-title" {
             h2 id="quantities-title" { "The numbers" }
             div class="scroll" tabindex="0" role="region" aria-labelledby="quantities-title" {
                 table {
@@ -281,7 +154,7 @@ fn quantities(audit: &Audit) -> Markup {
 /// What was odd, and how everything was computed.
 fn files(audit: &Audit) -> Markup {
     html! {
-        section class="files" {
+        section class="files" id="method" {
             h2 { "The files, and how this was made" }
             @if audit.problems.is_empty() {
                 p { "Nothing was odd in the files." }
@@ -376,8 +249,7 @@ mod tests {
     }
 
     fn without_style_and_script(page: &str) -> String {
-        let mut text =
-            page.replace(include_str!("report.css"), "").replace(include_str!("report.js"), "");
+        let mut text = page.replace(include_str!("report.css"), "").replace(SCRIPT, "");
         while let Some(at) = text.find("data:image") {
             let end = at + text[at..].find('"').expect("attributes end");
             text.replace_range(at..end, "");
@@ -387,8 +259,8 @@ mod tests {
 
     #[test]
     fn well_formed_and_alone() {
-        let photos = sample::photos();
-        let page = page(&sample::audit(), &photos);
+        let pictures = sample::pictures();
+        let page = page(&sample::audit(), &pictures);
         assert_well_formed(&page);
         assert!(!page.contains("http://") && !page.contains("https://"), "the page loads nothing");
         assert!(!page.contains("url(") && !page.contains("@import"), "the style loads nothing");
@@ -426,7 +298,7 @@ mod tests {
 
     #[test]
     fn every_image_and_drawing_has_words() {
-        let page = page(&sample::audit(), &sample::photos());
+        let page = page(&sample::audit(), &sample::pictures());
         for tag in tags(&page).into_iter().filter(|tag| !tag.starts_with('/')) {
             match name(tag) {
                 "img" => assert!(tag.contains(" alt=\""), "{tag}"),
@@ -446,9 +318,9 @@ mod tests {
         for frame in &mut audit.frames {
             frame.color = Some(evil.to_owned());
         }
-        let page = page(&audit, &sample::photos());
+        let page = page(&audit, &sample::pictures());
         assert_well_formed(&page);
-        assert_eq!(page.matches("<script").count(), 1, "our own alone");
+        assert_eq!(page.matches("<script").count(), 2, "our own script and its data alone");
         assert!(page.contains("&lt;script&gt;alert('&quot;&amp;amp;')&lt;/script&gt;"));
     }
 
@@ -462,7 +334,7 @@ mod tests {
         audit.own_depth = None;
         audit.findings.clear();
         audit.frames.clear();
-        let page = page(&audit, &[]);
+        let page = page(&audit, &Pictures::default());
         assert_well_formed(&page);
         assert!(page.contains("Nothing could be checked."));
     }
@@ -482,15 +354,15 @@ mod tests {
             finding.value = Some(f64::NAN);
             finding.sigma = Some(f64::INFINITY);
         }
-        let text = without_style_and_script(&page(&audit, &[]));
+        let text = without_style_and_script(&page(&audit, &Pictures::default()));
         assert!(!text.contains("NaN") && !text.contains(">inf"));
     }
 
     #[test]
     fn same_input_same_bytes() {
         assert_eq!(
-            page(&sample::audit(), &sample::photos()),
-            page(&sample::audit(), &sample::photos())
+            page(&sample::audit(), &sample::pictures()),
+            page(&sample::audit(), &sample::pictures())
         );
     }
 }

@@ -1,0 +1,148 @@
+//! What the page is before anybody touches it.
+
+use std::path::Path;
+
+use crate::{
+    browser,
+    driver::{Browser, Pointer},
+    folder, real_recordings, simulated_report, truedepth,
+};
+
+/// Figures that a report of a recording with factory metadata, board and depth has.
+const FIGURES: [&str; 10] = [
+    "depth-factory",
+    "depth-own",
+    "depth-error",
+    "depth-frames",
+    "depth-range",
+    "focal",
+    "lens",
+    "models",
+    "residuals",
+    "views",
+];
+/// More than this nobody wants to send to a colleague.
+const MAX_BYTES: u64 = 5_000_000;
+
+fn assert_quiet(browser: &Browser) {
+    assert_eq!(browser.console(), [""; 0], "on the console");
+    let requests = browser.requests();
+    let foreign: Vec<_> = requests.iter().filter(|url| !url.starts_with("file:")).collect();
+    assert!(foreign.is_empty(), "asked for {foreign:?}");
+    assert_eq!(requests.len(), 1, "the page itself and nothing else: {requests:?}");
+}
+
+/// Each figure has marks inside its drawing, words below it, and rows in its table.
+fn assert_figures(browser: &Browser) {
+    for id in FIGURES {
+        let number = |what: &str| {
+            let counted = browser.script(&format!(
+                "const f = document.getElementById({id:?}); return f ? f.querySelectorAll({what:?}).length : -1;"
+            ));
+            counted.as_i64().expect("a number")
+        };
+        assert!(number(".plot .mark") >= 1, "{id} has no marks");
+        assert!(number("tbody tr") >= 1, "{id} has no numbers");
+        let caption = browser
+            .script(&format!("return document.querySelector('#{id} figcaption').innerText.length"));
+        assert!(caption.as_i64().expect("a number") > 40, "{id} has no caption");
+    }
+    // Drawn, not only there: pixels of more than one colour.
+    for canvas in ["#space-view", "#over canvas", "#edges canvas"] {
+        browser.wait_for(&format!(
+            "(() => {{ const c = document.querySelector({canvas:?});
+               const d = new Uint32Array(c.getContext('2d').getImageData(0, 0, c.width, c.height).data.buffer);
+               return new Set(d).size > 1; }})()"
+        ));
+    }
+}
+
+/// Nothing is cut off at the side of a phone, and everything that can be pressed can be hit by a finger.
+fn assert_fits(browser: &Browser) {
+    let wide =
+        browser.script("return [document.documentElement.scrollWidth, innerWidth].join(' of ')");
+    let fits = browser.script("return document.documentElement.scrollWidth <= innerWidth");
+    assert_eq!(fits, true, "the page is {wide} px wide");
+}
+
+/// Every text stands out from what is behind it: at least 4.5 : 1, 3 : 1 where it is large (WCAG 2.2, 1.4.3).
+fn assert_contrast(browser: &Browser, scheme: &str) {
+    let faint = browser.script(
+        r"
+        const rgba = (text) => { const n = text.match(/[\d.]+/g).map(Number); return [...n.slice(0, 3), n[3] ?? 1]; };
+        const light = ([r, g, b]) => {
+          const [x, y, z] = [r, g, b].map((v) => v / 255).map((v) => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
+          return 0.2126 * x + 0.7152 * y + 0.0722 * z;
+        };
+        const behind = (element) => {
+          for (let e = element; e; e = e.parentElement) {
+            const colour = rgba(getComputedStyle(e).backgroundColor);
+            if (colour[3] > 0.9) return colour;
+          }
+          return [255, 255, 255];
+        };
+        const faint = [];
+        for (const element of document.body.querySelectorAll('*')) {
+          const says = [...element.childNodes].some((n) => n.nodeType === 3 && n.textContent.trim());
+          if (!says || !element.checkVisibility() || element.closest('.overlay, script, style, noscript')) continue;
+          const style = getComputedStyle(element);
+          const ink = rgba(element.closest('svg') ? style.fill === 'none' ? style.color : style.fill : style.color);
+          const [a, b] = [light(ink), light(behind(element))].sort((p, q) => q - p);
+          const ratio = (a + 0.05) / (b + 0.05);
+          const size = parseFloat(style.fontSize);
+          const large = size >= 24 || (size >= 18.66 && style.fontWeight >= 700);
+          if (ratio < (large ? 3 : 4.5)) faint.push(`${ratio.toFixed(2)} ${element.tagName}.${element.className.baseVal ?? element.className} ${element.textContent.trim().slice(0, 40)}`);
+        }
+        return [...new Set(faint)].join('\n');
+    ",
+    );
+    assert_eq!(faint, "", "too faint in {scheme}");
+}
+
+/// At phone and desktop width, light and dark, and on paper.
+fn look(browser: &Browser, page: &Path, name: &str) {
+    for scheme in ["light", "dark"] {
+        browser.media(scheme, "screen");
+        for (device, width, height, pointer) in
+            [("phone", 390, 844, Pointer::Touch), ("desk", 1280, 900, Pointer::Mouse)]
+        {
+            browser.window(width, height, pointer);
+            browser.open(page);
+            browser.wait_for("document.querySelector('#space-view')?.dataset.points > 0");
+            assert_fits(browser);
+            assert_figures(browser);
+            assert_contrast(browser, scheme);
+            assert_quiet(browser);
+            browser.screenshot(&folder().join(format!("{name}-{device}-{scheme}.png")));
+        }
+    }
+    browser.media("light", "print");
+    browser.window(794, 1123, Pointer::Mouse); // A4 at 96 dpi
+    browser.screenshot(&folder().join(format!("{name}-print.png")));
+}
+
+#[test]
+fn simulated() {
+    let Some(browser) = browser() else { return };
+    let page = simulated_report("page");
+    look(&browser, &page, "simulated");
+    let bytes = std::fs::metadata(&page).expect("it was written").len();
+    assert!(bytes < MAX_BYTES, "{bytes} bytes");
+}
+
+#[test]
+fn real() {
+    let (Some(recordings), Some(browser)) = (real_recordings(), browser()) else { return };
+    for (recording, name) in [("iPhone11Pro_iOS14", "iphone"), ("iPadPro12_5gen_iOS15", "ipad")] {
+        let report = folder().join(name);
+        std::fs::remove_dir_all(&report).ok();
+        let recording = recordings.join(recording);
+        let [recording, out] = [&recording, &report].map(|path| path.to_str().expect("UTF-8"));
+        truedepth(&["audit", recording, "-o", out]);
+        let page = report.join("report.html");
+        look(&browser, &page, name);
+        let bytes = std::fs::metadata(&page).expect("it was written").len();
+        assert!(bytes < MAX_BYTES, "{name}: {bytes} bytes");
+        println!("{name}: report.html takes {:.2} MB", bytes as f64 / 1e6);
+    }
+}

@@ -1,0 +1,98 @@
+// Two pictures on top of each other, and a line between them that a slider, a pointer or a finger moves.
+if (closeups) {
+  // From near to far: dark blue to yellow, apart for the colour-blind, ordered in grey (after viridis).
+  const RAMP = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
+  const HOLE = [128, 128, 128];
+  const EDGE = [255, 122, 26];
+
+  const ramp = (share) => {
+    const at = Math.max(0, Math.min(share, 1)) * (RAMP.length - 1);
+    const i = Math.min(Math.floor(at), RAMP.length - 2);
+    return RAMP[i].map((from, c) => from + (at - i) * (RAMP[i + 1][c] - from));
+  };
+
+  // The depths between which 96 of 100 lie.
+  const range_of = (depth_m) => {
+    const sorted = depth_m.filter((z) => z === z).sort();
+    const pick = (share) => sorted[Math.floor(share * (sorted.length - 1))];
+    return sorted.length > 0 ? [pick(0.02), pick(0.98)] : [0, 1];
+  };
+
+  const paint = (canvas, frame, colour_of) => {
+    canvas.width = frame.columns;
+    canvas.height = frame.rows;
+    const context = canvas.getContext("2d");
+    const image = context.createImageData(frame.columns, frame.rows);
+    for (let i = 0; i < frame.depth_m.length; i++) {
+      const colour = colour_of(i);
+      if (colour) image.data.set([...colour, 255], 4 * i);
+    }
+    context.putImageData(image, 0, 0);
+  };
+
+  const paint_depth = (canvas, frame) => {
+    const [near, far] = range_of(frame.depth_m);
+    paint(canvas, frame, (i) => {
+      const z = frame.depth_m[i];
+      return z === z ? ramp((z - near) / (far - near)) : HOLE;
+    });
+    const scale = canvas.closest("figure").querySelector(".scale-of-colours");
+    scale.querySelector(".near").textContent = `${(1000 * near).toFixed(0)} mm`;
+    scale.querySelector(".far").textContent = `${(1000 * far).toFixed(0)} mm away`;
+  };
+
+  // On a plane the reciprocal of depth is linear in the pixels, at whatever tilt, so its second difference shows where
+  // the surface bends or jumps. What is large is told by how large it mostly is.
+  const paint_edges = (canvas, frame) => {
+    const { columns, rows, depth_m } = frame;
+    const REACH = 3;
+    const bend = new Float32Array(depth_m.length).fill(NaN);
+    for (let y = REACH; y < rows - REACH; y++) {
+      for (let x = REACH; x < columns - REACH; x++) {
+        const i = y * columns + x;
+        const across = 1 / depth_m[i - REACH] + 1 / depth_m[i + REACH] - 2 / depth_m[i];
+        const down = 1 / depth_m[i - REACH * columns] + 1 / depth_m[i + REACH * columns] - 2 / depth_m[i];
+        bend[i] = Math.hypot(across, down) * depth_m[i];
+      }
+    }
+    const sorted = bend.filter((b) => b === b).sort();
+    const limit = Math.max(6 * (sorted[sorted.length >> 1] ?? 0), 0.02);
+    paint(canvas, frame, (i) => (bend[i] > limit ? EDGE : null));
+  };
+
+  for (const [id, painter] of [["over", paint_depth], ["edges", paint_edges]]) {
+    const figure = document.getElementById(id);
+    const [stage, canvas, image, slider] = [".stage", "canvas", "img", "input"].map((s) => figure.querySelector(s));
+    let frame = null;
+    const cut = () => stage.style.setProperty("--cut", `${slider.value}%`);
+    const place = (event) => {
+      const box = stage.getBoundingClientRect();
+      return [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
+    };
+    const pull = (event) => {
+      slider.value = 100 * place(event)[0];
+      cut();
+    };
+    slider.addEventListener("input", cut);
+    stage.addEventListener("pointerdown", (event) => {
+      stage.setPointerCapture(event.pointerId);
+      pull(event);
+    });
+    stage.addEventListener("pointermove", (event) => {
+      if (event.buttons > 0) pull(event);
+      const [x, y] = place(event).map((share, axis) => Math.floor(share * (axis ? frame.rows : frame.columns)));
+      const z = frame.depth_m[y * frame.columns + x];
+      const words = z === z ? `${(1000 * z).toFixed(1)} mm` : "no measurement";
+      const [left, top] = [event.clientX, event.clientY - 6];
+      tip.show(`(${x * frame.step}, ${y * frame.step}) px: ${words}`, { left, right: left, top, bottom: top + 20 });
+    });
+    stage.addEventListener("pointerleave", () => tip.hide());
+    closeups.watch((chosen) => {
+      frame = chosen;
+      image.src = frame.image.src;
+      stage.style.aspectRatio = `${closeups.scene.size_px[0]} / ${closeups.scene.size_px[1]}`;
+      painter(canvas, frame);
+    });
+    cut();
+  }
+}
