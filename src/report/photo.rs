@@ -62,8 +62,8 @@ impl Photo {
     }
 }
 
-/// The image at most so wide: the mean of square blocks of pixels, incomplete blocks dropped. Values are averaged as stored: for a
-/// thumbnail the difference to linear light cannot be seen.
+/// The image at most so wide: the mean of square blocks of pixels, incomplete blocks dropped. Values are averaged as
+/// stored: for a thumbnail the difference to linear light cannot be seen.
 fn shrunk(image: &Rgb, max_width: usize) -> Rgb {
     // A very tall image is made smaller by more than its width asks for, down to at least one pixel.
     let factor =

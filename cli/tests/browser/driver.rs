@@ -188,7 +188,10 @@ impl Browser {
     #[track_caller]
     pub(crate) fn drag(&self, pointer: Pointer, selector: &str, from: [f64; 2], to: [f64; 2]) {
         let [x, y] = self.center_of(selector);
-        let at = |[dx, dy]: [f64; 2], ms: u32| json!({"type": "pointerMove", "duration": ms, "x": (x + dx).round(), "y": (y + dy).round()});
+        let at = |[dx, dy]: [f64; 2], ms: u32| {
+            let (x, y) = ((x + dx).round(), (y + dy).round());
+            json!({"type": "pointerMove", "duration": ms, "x": x, "y": y})
+        };
         let middle = [0, 1].map(|axis| f64::midpoint(from[axis], to[axis]));
         let actions = json!([
             at(from, 0), {"type": "pointerDown", "button": 0}, at(middle, 60), at(to, 60),

@@ -80,7 +80,7 @@ impl Figure {
 
 impl Table {
     /// As HTML, folded.
-    fn to_html(&self, summary: &str) -> Markup {
+    pub(super) fn to_html(&self, summary: &str) -> Markup {
         html! {
             details class="data" {
                 summary { (summary) }

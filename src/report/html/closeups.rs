@@ -5,12 +5,14 @@ use serde::Serialize;
 
 use crate::{
     audit::{Audit, FrameAudit},
+    calibrate::Estimate,
     camera::{Camera, Distortion},
     depth::{BoardDepth, MAX_ERROR_M},
     diagnose::Correction,
     geom::{Board, Color, Pixel, Pose},
     pose::View,
     report::{
+        figures::Table,
         pictures::{Closeup, DEPTH_UNIT_M, Pictures},
         words::{self, plain, signed},
     },
@@ -32,6 +34,15 @@ struct Scene {
     frames: Vec<Frame>,
     /// Of every frame, `color_from_board` in each state: rows of the rotation, then the translation in metres.
     poses: Vec<Vec<Option<[f64; 12]>>>,
+    alignment: Option<Alignment>,
+}
+
+/// Colour pixel = centre + zoom · (depth pixel − shift − centre).
+#[derive(Serialize)]
+struct Alignment {
+    zoom: f64,
+    shift_px: [f64; 2],
+    center_px: [f64; 2],
 }
 
 /// How pixels and depths become points.
@@ -190,6 +201,13 @@ pub(super) fn closeups(audit: &Audit, pictures: &Pictures) -> Option<Markup> {
                     .collect()
             })
             .collect(),
+        alignment: audit.registration.as_ref().zip(audit.camera.as_ref()).map(|(r, camera)| {
+            Alignment {
+                zoom: r.zoom.value,
+                shift_px: r.shift_px.map(|shift| shift.value),
+                center_px: [camera.intrinsics.cx, camera.intrinsics.cy],
+            }
+        }),
     };
     let json = serde_json::to_string(&scene).expect("numbers and strings always serialise");
     Some(html! {
@@ -264,59 +282,105 @@ fn space(cases: &[Case<'_>], audit: &Audit) -> Markup {
     }
 }
 
+/// A stage with the frame's photo below and drawings over it; the script fills them and moves the line between them.
+fn stage(layers: &[(&str, &str)], slider: &str, at: u32) -> Markup {
+    html! {
+        div class="stage" {
+            img alt="The frame’s colour image";
+            @for (class, words) in layers {
+                div class=(format!("layer {class}")) { canvas role="img" aria-label=(words) {} }
+            }
+        }
+        input type="range" min="0" max="100" value=(at) aria-label=(slider);
+    }
+}
+
 fn depth_over_colour(audit: &Audit, shown: &[&Closeup]) -> Markup {
     let error = |depth: Option<&BoardDepth>, frame: usize| {
         let found = depth.and_then(|depth| depth.frames.iter().find(|f| f.frame == frame));
         let error_m = found.and_then(|found| found.median_error_m);
         error_m.map_or("—".to_owned(), |error_m| signed(1e3 * error_m, 2))
     };
+    let row = |closeup: &&Closeup| {
+        let frame = &audit.frames[closeup.frame];
+        vec![
+            closeup.frame.to_string(),
+            frame.color.clone().unwrap_or_default(),
+            frame.holes.map_or("—".to_owned(), |holes| plain(100.0 * holes, 1)),
+            error(audit.factory_depth.as_ref(), closeup.frame),
+            error(audit.own_depth.as_ref(), closeup.frame),
+        ]
+    };
+    let table = Table {
+        header: vec![
+            "frame",
+            "image",
+            "without measurement, %",
+            "factory error, mm",
+            "own error, mm",
+        ],
+        rows: shown.iter().map(row).collect(),
+    };
     html! {
         figure class="figure compare" id="over" {
             h3 { "Depth over colour" }
-            div class="stage" { img alt="The frame’s colour image"; canvas role="img" aria-label="Its depth" {} }
-            input type="range" min="0" max="100" value="50" aria-label="How much of the picture shows depth, percent";
+            (stage(&[("left", "Its depth")], "How much of the picture shows depth, percent", 50))
             div class="scale-of-colours" { span class="near" {} span class="ramp" {} span class="far" {} }
             figcaption {
-                "Left of the line depth, right of it colour; grey is without measurement. Depth should end where things \
-                 end in the image."
+                "Left of the line depth, right of it colour; grey is without measurement. Depth should end where \
+                 things end in the image."
             }
-            details class="data" {
-                summary { "Numbers behind “Depth over colour”" }
-                div class="scroll" tabindex="0" role="region" aria-label="Numbers behind “Depth over colour”" {
-                    table {
-                        thead { tr {
-                            @for title in ["frame", "image", "without measurement, %", "factory error, mm", "own error, mm"] {
-                                th scope="col" { (title) }
-                            }
-                        } }
-                        tbody {
-                            @for closeup in shown {
-                                @let frame = &audit.frames[closeup.frame];
-                                tr {
-                                    td { (closeup.frame) }
-                                    td { (frame.color.clone().unwrap_or_default()) }
-                                    td { (frame.holes.map_or("—".to_owned(), |holes| plain(100.0 * holes, 1))) }
-                                    td { (error(audit.factory_depth.as_ref(), closeup.frame)) }
-                                    td { (error(audit.own_depth.as_ref(), closeup.frame)) }
-                                }
-                            }
-                        }
-                    }
-                }
-            }
+            (table.to_html("Numbers behind “Depth over colour”"))
         }
     }
 }
 
-fn edges(_audit: &Audit) -> Markup {
+/// Bends and jumps of the depth over the photo, as recorded and moved to where the registration says they belong.
+fn edges(audit: &Audit) -> Markup {
+    let registration = audit.registration.as_ref();
+    let rows = registration.map(|r| {
+        let row = |name: &str, estimate: Estimate, decimals: usize| {
+            vec![name.to_owned(), plain(estimate.value, decimals), plain(estimate.sigma, decimals)]
+        };
+        vec![
+            row("zoom of depth against colour", r.zoom, 5),
+            row("shift to the right, px", r.shift_px[0], 3),
+            row("shift down, px", r.shift_px[1], 3),
+        ]
+    });
+    let layers = [
+        ("left", "Edges of its depth as recorded"),
+        ("right", "The same edges moved by zoom and shift"),
+    ];
     html! {
         figure class="figure compare" id="edges" {
             h3 { "Edges of depth on colour" }
-            div class="stage" { img alt="The frame’s colour image"; canvas role="img" aria-label="Edges of its depth" {} }
-            input type="range" min="0" max="100" value="100" aria-label="How much of the picture shows edges, percent";
+            (stage(
+                if rows.is_some() { &layers } else { &layers[..1] },
+                "Left of it edges as recorded, percent",
+                if rows.is_some() { 50 } else { 100 },
+            ))
+            @if rows.is_some() {
+                ul class="legend" {
+                    li class="edges-before" { "left: as recorded" }
+                    li class="edges-after" { "right: moved by the measured zoom and shift" }
+                }
+            }
             figcaption {
-                "Where the depth bends or jumps, drawn on the colour image up to the line. Edges that all lie beside \
-                 what they belong to, more so towards the border, are a wrong zoom; all to one side, a shift."
+                "Where the depth bends or jumps, drawn on the colour image. Edges that all lie beside what they belong \
+                 to, more so towards the border, are a wrong zoom; all to one side, a shift."
+                @if let Some(r) = registration {
+                    (words::unbroken(&format!(
+                        " Measured from the board’s whole surface in {}: zoom {}, shift {} px right and {} px down.",
+                        words::count(r.n_frames, "frame"),
+                        words::value_and_sigma(r.zoom, 4),
+                        words::signed_with_sigma(r.shift_px[0], 2),
+                        words::signed_with_sigma(r.shift_px[1], 2),
+                    )))
+                }
+            }
+            @if let Some(rows) = rows {
+                (Table { header: vec!["depth against colour", "value", "σ"], rows }.to_html("Numbers behind “Edges”"))
             }
         }
     }

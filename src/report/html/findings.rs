@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use crate::{
     audit::Audit,
-    diagnose::{Correction, Finding, Verdict},
+    diagnose::{Correction, Evidence, Finding, Verdict},
     report::{figures, words},
 };
 
@@ -117,25 +117,15 @@ fn evidence(audit: &Audit, finding: &Finding) -> Markup {
 }
 
 fn evidence_table(finding: &Finding) -> Markup {
-    html! {
-        details class="data" {
-            summary { "The numbers behind it" }
-            div class="scroll" tabindex="0" role="region" aria-label="The numbers behind it" {
-                table {
-                    thead { tr { th scope="col" { "quantity" } th scope="col" { "value" } th scope="col" { "σ" } } }
-                    tbody {
-                        @for evidence in &finding.evidence {
-                            tr {
-                                td { (evidence.name.replace('_', " ")) }
-                                td { (words::trimmed(evidence.value, 4)) }
-                                td { (evidence.sigma.map_or(String::new(), |sigma| words::trimmed(sigma, 4))) }
-                            }
-                        }
-                    }
-                }
-            }
-        }
-    }
+    let row = |evidence: &Evidence| {
+        let sigma = evidence.sigma.map_or(String::new(), |sigma| words::trimmed(sigma, 4));
+        vec![evidence.name.replace('_', " "), words::trimmed(evidence.value, 4), sigma]
+    };
+    let table = figures::Table {
+        header: vec!["quantity", "value", "σ"],
+        rows: finding.evidence.iter().map(row).collect(),
+    };
+    table.to_html("The numbers behind it")
 }
 
 /// What a correction does, in a sentence.

@@ -57,7 +57,8 @@ fn picture(audit: &Audit, photo: &Photo, frame: &FrameAudit) -> Markup {
         figure {
             button type="button" class="zoom" aria-label=(format!("Enlarge {name}")) {
                 span class="picture" style=(format!("aspect-ratio: {width} / {height}")) {
-                    img id=(format!("photo-{}", photo.frame)) src=(photo.data_uri()) alt=(format!("Colour image {name}, {corners} found")) loading="lazy";
+                    img id=(format!("photo-{}", photo.frame)) src=(photo.data_uri()) loading="lazy"
+                        alt=(format!("Colour image {name}, {corners} found"));
                     svg viewBox=(view_box) aria-hidden="true" { (overlay.to_svg(width)) }
                 }
             }

@@ -3,7 +3,7 @@ if (closeups) {
   // From near to far: dark blue to yellow, apart for the colour-blind, ordered in grey (after viridis).
   const RAMP = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
   const HOLE = [128, 128, 128];
-  const EDGE = [255, 122, 26];
+  const EDGES = { left: [255, 122, 26], right: [60, 170, 255] };
 
   const ramp = (share) => {
     const at = Math.max(0, Math.min(share, 1)) * (RAMP.length - 1);
@@ -30,7 +30,7 @@ if (closeups) {
     context.putImageData(image, 0, 0);
   };
 
-  const paint_depth = (canvas, frame) => {
+  const paint_depth = ([canvas], frame) => {
     const [near, far] = range_of(frame.depth_m);
     paint(canvas, frame, (i) => {
       const z = frame.depth_m[i];
@@ -43,7 +43,7 @@ if (closeups) {
 
   // On a plane the reciprocal of depth is linear in the pixels, at whatever tilt, so its second difference shows where
   // the surface bends or jumps. What is large is told by how large it mostly is.
-  const paint_edges = (canvas, frame) => {
+  const paint_edges = (canvases, frame) => {
     const { columns, rows, depth_m } = frame;
     const REACH = 3;
     const bend = new Float32Array(depth_m.length).fill(NaN);
@@ -57,12 +57,28 @@ if (closeups) {
     }
     const sorted = bend.filter((b) => b === b).sort();
     const limit = Math.max(6 * (sorted[sorted.length >> 1] ?? 0), 0.02);
-    paint(canvas, frame, (i) => (bend[i] > limit ? EDGE : null));
+    for (const canvas of canvases) {
+      const side = canvas.parentElement.classList.contains("left") ? "left" : "right";
+      paint(canvas, frame, (i) => (bend[i] > limit ? EDGES[side] : null));
+    }
+  };
+
+  // Puts a canvas of kept depth pixels over the photo: each belongs to the first pixel of its block; with an alignment,
+  // to where that says its colour is. In shares of the picture, so that it holds at every size.
+  const lay = (canvas, frame, alignment) => {
+    const zoom = alignment?.zoom ?? 1;
+    const offset = [0, 1].map((axis) => {
+      const center = (alignment?.center_px[axis] ?? 0) + 0.5;
+      const shift = (alignment?.shift_px[axis] ?? 0) + (frame.step - 1) / 2;
+      return (100 * (center * (1 - zoom) - zoom * shift)) / closeups.scene.size_px[axis];
+    });
+    canvas.style.transform = `translate(${offset[0]}%, ${offset[1]}%) scale(${zoom})`;
   };
 
   for (const [id, painter] of [["over", paint_depth], ["edges", paint_edges]]) {
     const figure = document.getElementById(id);
-    const [stage, canvas, image, slider] = [".stage", "canvas", "img", "input"].map((s) => figure.querySelector(s));
+    const [stage, image, slider] = [".stage", "img", "input"].map((selector) => figure.querySelector(selector));
+    const canvases = [...figure.querySelectorAll("canvas")];
     let frame = null;
     const cut = () => stage.style.setProperty("--cut", `${slider.value}%`);
     const place = (event) => {
@@ -91,7 +107,10 @@ if (closeups) {
       frame = chosen;
       image.src = frame.image.src;
       stage.style.aspectRatio = `${closeups.scene.size_px[0]} / ${closeups.scene.size_px[1]}`;
-      painter(canvas, frame);
+      painter(canvases, frame);
+      for (const canvas of canvases) {
+        lay(canvas, frame, canvas.parentElement.classList.contains("right") ? closeups.scene.alignment : null);
+      }
     });
     cut();
   }
