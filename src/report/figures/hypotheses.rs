@@ -44,7 +44,7 @@ pub(in crate::report) fn rms_by_model(audit: &Audit) -> Option<Figure> {
 
 /// RMS under every assumption about the lens' distortion.
 pub(in crate::report) fn rms_by_lens(audit: &Audit) -> Option<Figure> {
-    let test = audit.calibration.as_ref()?.distortion.as_ref()?;
+    let test = audit.distortion.as_ref()?;
     let rows: Vec<Row> = test
         .hypotheses
         .iter()

@@ -137,6 +137,11 @@ fn correction_words(correction: &Correction) -> String {
                 words::plain(*focal_px, 2)
             )
         }
+        Correction::PrincipalPoint { center_px: [x, y] } => format!(
+            "Use the principal point ({}, {}) px at the size of these images.",
+            words::plain(*x, 2),
+            words::plain(*y, 2)
+        ),
         Correction::Undistort { tables: Some(_) } => {
             "Resample the images to straight lines with the tables of this recording.".to_owned()
         }
