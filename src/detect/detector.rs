@@ -11,7 +11,7 @@ use super::{
     map::SmoothMap,
     pyramid::Level,
     refine::{Guess, Scales, Window, refine},
-    saddle::saddles,
+    saddle::{self, saddles},
 };
 
 /// Finds a board in images.
@@ -37,7 +37,7 @@ impl Clone for Detector {
 #[derive(Debug, Default)]
 struct Memory {
     level: Level,
-    response: Vec<f32>,
+    search: saddle::Memory,
     window: Window,
 }
 
@@ -80,11 +80,11 @@ impl Detector {
 
     fn detect_in(&self, image: &Gray, memory: &mut Memory) -> Observation {
         let mut rejects = Vec::new();
-        let Memory { level, response, window } = memory;
+        let Memory { level, search, window } = memory;
         let mut scales = Scales::new(image, window);
         for factor in factors(image) {
             if level.fill(image, factor).is_some()
-                && let Some(found) = self.search(&mut scales, level, response, &mut rejects)
+                && let Some(found) = self.search(&mut scales, level, search, &mut rejects)
             {
                 return self.collect(&mut scales, &found, rejects);
             }
@@ -97,12 +97,12 @@ impl Detector {
         &self,
         scales: &mut Scales<'_>,
         level: &Level,
-        response: &mut Vec<f32>,
+        memory: &mut saddle::Memory,
         rejects: &mut Vec<Reject>,
     ) -> Option<Found> {
         let mpx = (level.width * level.height) as f64 * 1e-6;
         let most = ((MOST_SADDLES_PER_MPX * mpx) as usize).max(LEAST_MOST_SADDLES);
-        let saddles = saddles(level, most, response);
+        let saddles = saddles(level, most, memory);
         let mut identified: Option<Found> = None;
         for mut lattice in lattices(level, &saddles, MIN_NODES).into_iter().take(MOST_LATTICES) {
             if identified.is_some() {

@@ -21,7 +21,7 @@
 //!
 //! N being the number of independent samples. It is blind deconvolution with a finite list of candidate images.
 
-use std::{ops::Range, sync::OnceLock};
+use std::{array, ops::Range, sync::OnceLock};
 
 use crate::{
     board::{CharucoBoard, Layout},
@@ -108,14 +108,16 @@ fn cells(
     map: &SmoothMap,
     bright: bool,
 ) -> Vec<Cell> {
-    let mut candidates = std::collections::BTreeSet::new();
+    let mut candidates = Vec::with_capacity(4 * lattice.nodes.len());
     for node in &lattice.nodes {
         for (di, dj) in [(-1, -1), (0, -1), (-1, 0), (0, 0)] {
             if lattice.is_bright(node.i + di, node.j + dj) == bright {
-                candidates.insert((node.j + dj, node.i + di));
+                candidates.push((node.j + dj, node.i + di));
             }
         }
     }
+    candidates.sort_unstable();
+    candidates.dedup();
     let mut cells = Vec::new();
     for (j, i) in candidates {
         let (x, y) = (f64::from(i), f64::from(j));
@@ -362,15 +364,31 @@ impl Expected {
         all
     }
 
-    /// The cells' values in the orientation of the board, for each turn.
-    fn turned(&self, cells: &[Cell], value: impl Fn(&Cell, usize) -> f32) -> Vec<Vec<f32>> {
-        TURNS
-            .iter()
-            .map(|&turn| {
-                let order = sample_order(self.size, turn);
-                cells.iter().flat_map(|cell| order.iter().map(|&k| value(cell, k))).collect()
-            })
-            .collect()
+    /// The cells' values in the orientation of the board, for each turn asked for; the other turns stay empty.
+    fn turned(
+        &self,
+        cells: &[Cell],
+        turns: Range<usize>,
+        value: impl Fn(&Cell, usize) -> f32,
+    ) -> [Vec<f32>; 8] {
+        let n2 = self.size * self.size;
+        let mut straight = Vec::with_capacity(cells.len() * n2);
+        for cell in cells {
+            straight.extend((0..n2).map(|k| value(cell, k)));
+        }
+        array::from_fn(|turn| {
+            if !turns.contains(&turn) {
+                return Vec::new();
+            }
+            let order = sample_order(self.size, TURNS[turn]);
+            let mut turned = Vec::with_capacity(straight.len());
+            for cell in straight.chunks_exact(n2) {
+                for &k in &order {
+                    turned.push(cell[k]);
+                }
+            }
+            turned
+        })
     }
 
     /// The placement whose markers the soft bits agree with.
@@ -385,10 +403,11 @@ impl Expected {
         }
         let (size, n2) = (self.size, self.size * self.size);
         // The border is the same for all markers: it sets the scale and has no vote.
-        let is_bit =
-            |k: usize| (1..size - 1).contains(&(k / size)) && (1..size - 1).contains(&(k % size));
-        let values = self.turned(cells, |cell, k| {
-            if !is_bit(k) {
+        let inner = 1..size - 1;
+        let is_bit: Vec<bool> =
+            (0..n2).map(|k| inner.contains(&(k / size)) && inner.contains(&(k % size))).collect();
+        let values = self.turned(cells, turns.clone(), |cell, k| {
+            if !is_bit[k] {
                 return 0.0;
             }
             let (middle, half) = ((cell.rim + cell.border) / 2.0, (cell.rim - cell.border) / 2.0);
@@ -435,7 +454,7 @@ impl Expected {
         }
         let n2 = self.size * self.size;
         let half = lattice.contrast as f32 / 2.0;
-        let values = self.turned(&cells, |cell, k| (cell.samples[k] - cell.rim) / half + 1.0);
+        let values = self.turned(&cells, 0..8, |cell, k| (cell.samples[k] - cell.rim) / half + 1.0);
         let blur = self.blur.get_or_init(|| BlurModel::new(self));
         // Every pair of a cell and a marker is met by many placements: correlate it once.
         let mut memo: Vec<Option<Box<[f64; TAPS]>>> =

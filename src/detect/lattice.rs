@@ -143,17 +143,19 @@ type Link = Option<(u32, u8)>;
 fn links(level: &Level, saddles: &[Saddle]) -> Vec<[Link; 4]> {
     let grid = Buckets::new(level, saddles);
     let mut one_way: Vec<[Link; 4]> = vec![[None; 4]; saddles.len()];
-    let mut near: Vec<(f32, u32)> = Vec::new();
+    let mut near: [Vec<Near>; 4] = Default::default();
     for (p, links) in one_way.iter_mut().enumerate() {
         // Rings of buckets outward until every edge has its neighbour, to 64 pixels at least: larger squares are found
         // on a coarser level.
         for reach in [1, 2, 4] {
-            near.clear();
-            grid.near(saddles, p, reach, &mut near);
-            near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            for (k, link) in links.iter_mut().enumerate() {
-                if link.is_none() {
-                    *link = neighbour(level, saddles, p, k, &near);
+            let open = [0, 1, 2, 3].map(|k| links[k].is_none());
+            grid.near(saddles, p, reach, open, &mut near);
+            for k in 0..4 {
+                if open[k] {
+                    let near = &mut near[k];
+                    near.sort_unstable_by(|a, b| a.square.total_cmp(&b.square).then(a.q.cmp(&b.q)));
+                    near.truncate(MOST_TRIED);
+                    links[k] = near.iter().find_map(|n| neighbour(level, saddles, p, k, n));
                 }
             }
             if links.iter().all(Option::is_some) || reach >= grid.columns.max(grid.rows) {
@@ -175,31 +177,24 @@ fn links(level: &Level, saddles: &[Saddle]) -> Vec<[Link; 4]> {
     mutual
 }
 
-/// The nearest saddle along edge `k` of `p` that could be its neighbour.
-fn neighbour(level: &Level, saddles: &[Saddle], p: usize, k: usize, near: &[(f32, u32)]) -> Link {
-    let here = &saddles[p];
-    let [ex, ey] = here.edges[k];
-    let mut tried = 0;
-    for &(distance, q) in near {
-        let there = &saddles[q as usize];
-        let (dx, dy) = (there.x - here.x, there.y - here.y);
-        if distance < MIN_SPACING || dx * ex + dy * ey < MIN_COS * distance {
-            continue;
-        }
-        tried += 1;
-        if tried > MOST_TRIED {
-            return None;
-        }
-        let (ux, uy) = (dx / distance, dy / distance);
-        let back = there.edges.iter().position(|[x, y]| -(ux * x + uy * y) > MIN_COS);
-        if let Some(l) = back
-            && here.is_bright_after(k) == there.is_bright_after((l + 3) % 4)
-            && is_edge(level, here, there, here.is_bright_after(k))
-        {
-            return Some((q, l as u8));
-        }
-    }
-    None
+/// A saddle in the direction of an edge of another.
+#[derive(Clone, Copy, Debug)]
+struct Near {
+    q: u32,
+    /// From the other to this, pixels of the level.
+    offset: [f32; 2],
+    /// Square of the distance.
+    square: f32,
+}
+
+/// The link along edge `k` of `p` to a saddle in that direction, if it can be its neighbour.
+fn neighbour(level: &Level, saddles: &[Saddle], p: usize, k: usize, near: &Near) -> Link {
+    let (here, there) = (&saddles[p], &saddles[near.q as usize]);
+    let ([dx, dy], least) = (near.offset, MIN_COS * near.square.sqrt());
+    let l = there.edges.iter().position(|[x, y]| -(dx * x + dy * y) > least)?;
+    let bright = here.is_bright_after(k);
+    (bright == there.is_bright_after((l + 3) % 4) && is_edge(level, here, there, bright))
+        .then_some((near.q, l as u8))
 }
 
 /// True where the line between two saddles separates bright from dark all the way.
@@ -299,8 +294,16 @@ impl Buckets {
         Self { size, columns, rows, starts, members }
     }
 
-    /// All saddles but `p` within `reach` buckets of it, with their distances.
-    fn near(&self, saddles: &[Saddle], p: usize, reach: usize, out: &mut Vec<(f32, u32)>) {
+    /// The saddles within `reach` buckets of `p` that lie in the direction of its edges, for those that are open.
+    fn near(
+        &self,
+        saddles: &[Saddle],
+        p: usize,
+        reach: usize,
+        open: [bool; 4],
+        out: &mut [Vec<Near>; 4],
+    ) {
+        out.iter_mut().for_each(Vec::clear);
         let here = &saddles[p];
         let column = ((here.x.max(0.0) / self.size) as usize).min(self.columns - 1);
         let row = ((here.y.max(0.0) / self.size) as usize).min(self.rows - 1);
@@ -310,10 +313,17 @@ impl Buckets {
             let range =
                 self.starts[r * self.columns + from]..self.starts[r * self.columns + to + 1];
             for &q in &self.members[range.start as usize..range.end as usize] {
-                if q as usize != p {
-                    let there = &saddles[q as usize];
-                    let (dx, dy) = (there.x - here.x, there.y - here.y);
-                    out.push(((dx * dx + dy * dy).sqrt(), q));
+                let there = &saddles[q as usize];
+                let (dx, dy) = (there.x - here.x, there.y - here.y);
+                let square = dx * dx + dy * dy;
+                if square < MIN_SPACING * MIN_SPACING {
+                    continue; // Itself, too.
+                }
+                for k in 0..4 {
+                    let along = dx * here.edges[k][0] + dy * here.edges[k][1];
+                    if open[k] && along > 0.0 && along * along >= MIN_COS * MIN_COS * square {
+                        out[k].push(Near { q, offset: [dx, dy], square });
+                    }
                 }
             }
         }

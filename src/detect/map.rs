@@ -74,30 +74,42 @@ impl SmoothMap {
         // x·w = h·(u, v, 1) with w = 1 + h6·u + h7·v is linear in h; dividing by the last w makes it geometric.
         let mut h = SVector::<f64, 8>::zeros();
         for pass in 0..3 {
-            let mut ata = SMatrix::<f64, 8, 8>::zeros();
-            let mut atb = SVector::<f64, 8>::zeros();
+            // The equations of x and y share their blocks: Σ p pᵀ, −Σ x p (u v), Σ (x² + y²)(u v)(u v)ᵀ, p = (u v 1).
+            let (mut pp, mut xp, mut yp) = ([0.0; 6], [0.0; 6], [0.0; 6]);
+            let mut last = [0.0; 6];
             for &[u, v, x, y] in &normalised {
                 let w = if pass == 0 { 1.0 } else { 1.0 + h[6] * u + h[7] * v };
                 if !(w > 0.05) {
                     return None; // A corner behind the camera: not a picture of a plane.
                 }
                 let weight = 1.0 / (w * w);
-                let rows = [
-                    ([u, v, 1.0, 0.0, 0.0, 0.0, -x * u, -x * v], x),
-                    ([0.0, 0.0, 0.0, u, v, 1.0, -y * u, -y * v], y),
-                ];
-                for (row, b) in rows {
-                    for i in 0..8 {
-                        if row[i] != 0.0 {
-                            let wi = weight * row[i];
-                            for j in 0..=i {
-                                ata[(i, j)] += wi * row[j];
-                            }
-                            atb[i] += wi * b;
-                        }
-                    }
+                let products = [u * u, u * v, v * v, u, v, 1.0].map(|product| product * weight);
+                let square = x * x + y * y;
+                for k in 0..6 {
+                    pp[k] += products[k];
+                    xp[k] += x * products[k];
+                    yp[k] += y * products[k];
+                    last[k] += square * products[k];
                 }
             }
+            let mut ata = SMatrix::<f64, 8, 8>::zeros();
+            let mut atb = SVector::<f64, 8>::zeros();
+            let [uu, uv, vv, u, v, n] = pp;
+            for (at, p) in [(0, xp), (3, yp)] {
+                let block = [[uu, uv, u], [uv, vv, v], [u, v, n]];
+                let cross = [[p[0], p[1], p[3]], [p[1], p[2], p[4]]];
+                for i in 0..3 {
+                    for j in 0..3 {
+                        ata[(at + i, at + j)] = block[i][j];
+                    }
+                    for j in 0..2 {
+                        ata[(6 + j, at + i)] = -cross[j][i];
+                    }
+                    atb[at + i] = p[3 + i];
+                }
+            }
+            (ata[(6, 6)], ata[(7, 6)], ata[(7, 7)]) = (last[0], last[1], last[2]);
+            (atb[6], atb[7]) = (-last[3], -last[4]);
             let trace = ata.trace();
             for i in 0..8 {
                 ata[(i, i)] += 1e-12 * trace;
@@ -125,8 +137,8 @@ impl SmoothMap {
             16..36 => 6,
             _ => 10,
         };
-        let mut ata = nalgebra::DMatrix::<f64>::zeros(terms, terms);
-        let mut atb = nalgebra::DMatrix::<f64>::zeros(terms, 2);
+        let mut ata = SMatrix::<f64, 10, 10>::identity();
+        let mut atb = SMatrix::<f64, 10, 2>::zeros();
         for (p, q) in corners {
             let Some(at) = self.at(p[0], p[1]) else { return };
             let m = monomials(
@@ -134,7 +146,8 @@ impl SmoothMap {
                 (p[1] - self.center[1]) * self.scale,
             );
             for i in 0..terms {
-                for j in 0..terms {
+                // The lower triangle is all that the decomposition reads.
+                for j in 0..=i {
                     ata[(i, j)] += m[i] * m[j];
                 }
                 atb[(i, 0)] += m[i] * (q.x - at.x);
@@ -143,7 +156,7 @@ impl SmoothMap {
         }
         let damping = 0.02 * corners.len() as f64;
         for i in 0..terms {
-            ata[(i, i)] += damping;
+            ata[(i, i)] += damping - 1.0; // One is there already, for the terms left out.
         }
         if let Some(cholesky) = ata.cholesky() {
             let solution = cholesky.solve(&atb);

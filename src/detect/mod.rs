@@ -30,6 +30,7 @@ mod map;
 mod pyramid;
 mod refine;
 mod saddle;
+mod simd;
 
 pub use detector::Detector;
 

@@ -2,6 +2,8 @@
 
 use crate::{geom::Pixel, image::Gray};
 
+use super::simd::vectorized;
+
 /// One level: every pixel averages a block of the image, then a binomial filter (1 4 6 4 1)/16 runs along both axes.
 ///
 /// A block average with a binomial is what keeps one pass over memory: the printed bits of the markers, the noise and
@@ -14,11 +16,15 @@ pub(super) struct Level {
     pub(super) factor: usize,
     /// Grey values 0..=255, smoothed.
     pub(super) gray: Vec<f32>,
-    /// Memory of the block sums.
+    /// Memory of the latest rows of block sums: row y lies at y modulo [`KEPT_ROWS`].
     blocks: Vec<u16>,
-    /// Memory of one row.
-    column: Vec<u16>,
+    /// Memory of one row, filtered along y, and of sums along y.
+    column: Vec<f32>,
+    sums: Vec<u32>,
 }
+
+/// Rows of block sums kept: the filter takes five.
+const KEPT_ROWS: usize = 8;
 
 impl Level {
     /// Makes this the level whose pixels are `factor` × `factor` blocks of `image`; rows and columns that fill no
@@ -29,22 +35,41 @@ impl Level {
             return None;
         }
         (self.width, self.height, self.factor) = (width, height, factor);
-        block_sums(image, factor, width, height, &mut self.blocks);
         self.gray.resize(width * height, 0.0);
-        self.column.resize(width + 4, 0);
-        let column = &mut self.column[..width + 4];
+        self.blocks.resize(KEPT_ROWS * width, 0);
+        self.column.resize(width + 4, 0.0);
+        self.sums.resize(width * factor, 0);
+        vectorized(
+            #[inline(always)]
+            || self.smooth(image),
+        );
+        Some(())
+    }
+
+    /// One pass over the image: block sums, then the filter along y, then along x.
+    #[inline(always)]
+    fn smooth(&mut self, image: &Gray) {
+        let (width, height, factor) = (self.width, self.height, self.factor);
         let scale = 1.0 / (256.0 * unit(factor) as f32);
+        let column = &mut self.column[..width + 4];
+        let mut n_blocks = 0;
         for y in 0..height {
+            while n_blocks < (y + 3).min(height) {
+                let out = &mut self.blocks[n_blocks % KEPT_ROWS * width..][..width];
+                block_sums(image, factor, n_blocks, out, &mut self.sums);
+                n_blocks += 1;
+            }
             // Beyond the border the outermost row repeats.
             let row = |dy: isize| {
                 let y = (y as isize + dy).clamp(0, height as isize - 1) as usize;
-                &self.blocks[y * width..][..width]
+                &self.blocks[y % KEPT_ROWS * width..][..width]
             };
             let [a, b, c, d, e] = [row(-2), row(-1), row(0), row(1), row(2)];
             let out = &mut column[2..2 + width];
             for i in 0..width {
                 // At most 4080 · 16: it fits.
-                out[i] = (a[i] + e[i]) + 4 * (b[i] + d[i]) + 6 * c[i];
+                let sum = (a[i] + e[i]) + 4 * (b[i] + d[i]) + 6 * c[i];
+                out[i] = f32::from(sum);
             }
             column[0] = column[2];
             column[1] = column[2];
@@ -53,13 +78,10 @@ impl Level {
             let [a, b, c, d, e] = [0, 1, 2, 3, 4].map(|dx| &column[dx..dx + width]);
             let out = &mut self.gray[y * width..][..width];
             for i in 0..width {
-                let wide = |v: u16| i32::from(v);
-                let sum =
-                    (wide(a[i]) + wide(e[i])) + 4 * (wide(b[i]) + wide(d[i])) + 6 * wide(c[i]);
-                out[i] = sum as f32 * scale;
+                // Whole numbers below 2²⁴: exact.
+                out[i] = ((a[i] + e[i]) + 4.0 * (b[i] + d[i]) + 6.0 * c[i]) * scale;
             }
         }
-        Some(())
     }
 
     /// Where a position of this level lies in the image.
@@ -83,36 +105,32 @@ fn unit(factor: usize) -> usize {
     (factor * factor).min(16)
 }
 
-/// The sum over each block, in units of 1/[`unit`] grey level.
-fn block_sums(image: &Gray, factor: usize, width: usize, height: usize, sums: &mut Vec<u16>) {
-    sums.resize(width * height, 0);
-    let mut columns = vec![0_u32; if factor > 2 { width * factor } else { 0 }];
-    for (y, out) in sums.chunks_exact_mut(width).enumerate() {
-        match factor {
-            1 => {
-                for (out, &p) in out.iter_mut().zip(image.row(y)) {
-                    *out = u16::from(p);
+/// The sums over one row of blocks, in units of 1/[`unit`] grey level. `sums` is memory for a row of the image.
+#[inline(always)]
+fn block_sums(image: &Gray, factor: usize, y: usize, out: &mut [u16], sums: &mut [u32]) {
+    match factor {
+        1 => {
+            for (out, &p) in out.iter_mut().zip(image.row(y)) {
+                *out = u16::from(p);
+            }
+        }
+        2 => {
+            let [top, bottom] = [2 * y, 2 * y + 1].map(|y| image.row(y).as_chunks::<2>().0);
+            for ((out, a), b) in out.iter_mut().zip(top).zip(bottom) {
+                let (a, b) = (u16::from_le_bytes(*a), u16::from_le_bytes(*b));
+                *out = ((a & 0xff) + (b & 0xff)) + ((a >> 8) + (b >> 8));
+            }
+        }
+        _ => {
+            sums.fill(0);
+            for dy in 0..factor {
+                for (sum, &p) in sums.iter_mut().zip(image.row(factor * y + dy)) {
+                    *sum += u32::from(p);
                 }
             }
-            2 => {
-                let (top, bottom) = (image.row(2 * y), image.row(2 * y + 1));
-                for ((out, a), b) in
-                    out.iter_mut().zip(top.chunks_exact(2)).zip(bottom.chunks_exact(2))
-                {
-                    *out = u16::from(a[0]) + u16::from(a[1]) + u16::from(b[0]) + u16::from(b[1]);
-                }
-            }
-            _ => {
-                columns.fill(0);
-                for dy in 0..factor {
-                    for (sum, &p) in columns.iter_mut().zip(image.row(factor * y + dy)) {
-                        *sum += u32::from(p);
-                    }
-                }
-                let (unit, n) = (unit(factor) as u32, (factor * factor) as u32);
-                for (out, block) in out.iter_mut().zip(columns.chunks_exact(factor)) {
-                    *out = ((block.iter().sum::<u32>() * unit + n / 2) / n) as u16;
-                }
+            let (unit, n) = (unit(factor) as u32, (factor * factor) as u32);
+            for (out, block) in out.iter_mut().zip(sums.chunks_exact(factor)) {
+                *out = ((block.iter().sum::<u32>() * unit + n / 2) / n) as u16;
             }
         }
     }

@@ -16,7 +16,7 @@
 
 use crate::{geom::Pixel, image::Gray};
 
-use super::pyramid::Level;
+use super::{pyramid::Level, simd::vectorized};
 
 /// A corner to refine.
 #[derive(Clone, Copy, Debug)]
@@ -175,7 +175,23 @@ fn refine_at(
     };
     let half =
         (along_u.max(width_v) * lu).max(along_v.max(width_u) * lv).min(MAX_REACH).ceil() as i64 + 1;
-    let mut q = [guess.pixel.x, guess.pixel.y];
+    vectorized(
+        #[inline(always)]
+        || iterate(image, window, &cross, half, guess.pixel, reach_px),
+    )
+}
+
+/// The fixed point of [`Window::solve`] that starts from a pixel, and its σ.
+#[inline(always)]
+fn iterate(
+    image: &Gray,
+    window: &mut Window,
+    cross: &Cross,
+    half: i64,
+    from: Pixel,
+    reach_px: f64,
+) -> Option<Refined> {
+    let mut q = [from.x, from.y];
     let mut center: Option<(i64, i64)> = None;
     for step in 0..MOST_STEPS {
         let (cx, cy) = (q[0].round() as i64, q[1].round() as i64);
@@ -183,16 +199,16 @@ fn refine_at(
             window.fill(image, cx, cy, half)?;
             center = Some((cx, cy));
         }
-        let next = window.solve(&cross, q)?;
+        let next = window.solve(cross, q)?;
         let moved = (next[0] - q[0]).hypot(next[1] - q[1]);
         q = next;
-        if !((q[0] - guess.pixel.x).hypot(q[1] - guess.pixel.y) <= reach_px) {
+        if !((q[0] - from.x).hypot(q[1] - from.y) <= reach_px) {
             return None;
         }
         if moved < CONVERGED || (step + 1 == MOST_STEPS && moved < 0.05) {
             return Some(Refined {
                 pixel: Pixel::new(q[0], q[1]),
-                sigma_px: window.sigma(&cross, q)?,
+                sigma_px: window.sigma(cross, q)?,
             });
         }
     }
@@ -209,24 +225,18 @@ fn blur_width(image: &Gray, guess: &Guess, edge: [f64; 2], other: [f64; 2], acro
     let step = 2.0 * reach / STEPS as f64;
     let mut narrowest: Option<f64> = None;
     for arm in [-0.3, 0.3] {
-        let mut profile = [0.0; STEPS + 1];
-        let seen = profile.iter_mut().enumerate().all(|(k, value)| {
-            let t = k as f64 * step - reach;
-            let at = Pixel::new(
-                guess.pixel.x + arm * edge[0] + t * other[0],
-                guess.pixel.y + arm * edge[1] + t * other[1],
-            );
-            image.bilinear(at).map(|v| *value = v).is_some()
-        });
+        let middle = [0, 1].map(|a| [guess.pixel.x, guess.pixel.y][a] + arm * edge[a]);
+        let at = |t: f64| Pixel::new(middle[0] + t * other[0], middle[1] + t * other[1]);
+        let Some(profile) = image.along::<{ STEPS + 1 }>(at(-reach), at(reach)) else { continue };
         let (from, to) = (profile[0], profile[STEPS]);
-        if !seen || (to - from).abs() < 0.3 * guess.contrast {
+        if (to - from).abs() < 0.3 * guess.contrast as f32 {
             continue;
         }
         let fraction = |k: usize| (profile[k] - from) / (to - from);
-        let crossing = |level: f64| {
+        let crossing = |level: f32| {
             (0..STEPS).find(|&k| fraction(k + 1) >= level).map(|k| {
                 let (a, b) = (fraction(k), fraction(k + 1));
-                k as f64 + (level - a) / (b - a).max(1e-9)
+                k as f64 + f64::from((level - a) / (b - a).max(1e-6))
             })
         };
         if let (Some(low), Some(high)) = (crossing(0.15), crossing(0.85)) {
@@ -279,13 +289,14 @@ pub(super) struct Window {
     /// Smoothed pixels, then the influences of gradients: memory only.
     work: Vec<f32>,
     column: Vec<u16>,
-    lines: [Vec<f32>; 2],
+    line: Vec<f32>,
     /// Σ w gx², Σ w gx gy, Σ w gy² of the last step.
     moments: [f64; 3],
 }
 
 impl Window {
     /// Fills the window with ± `half` pixels about a pixel, clipped to the image; `None` where less than 4 × 4 remain.
+    #[inline(always)]
     fn fill(&mut self, image: &Gray, cx: i64, cy: i64, half: i64) -> Option<()> {
         let clip = |c: i64, size: usize| ((c - half).max(0), (c + half).min(size as i64 - 1));
         let (x0, x1) = clip(cx, image.width());
@@ -340,6 +351,7 @@ impl Window {
     }
 
     /// One step: the corner that the weighted gradients about `q` point at.
+    #[inline(always)]
     fn solve(&mut self, cross: &Cross, q: [f64; 2]) -> Option<[f64; 2]> {
         let mut sums = [[0.0_f32; LANES]; 5];
         let first_dx = (self.x0 - q[0]) as f32;
@@ -375,8 +387,11 @@ impl Window {
 
     /// Standard deviation per coordinate, pixels per grey level of noise.
     ///
-    /// The derivative of Σ w g (gᵀr) by one gradient is w·((gᵀr)·1 + g·rᵀ). A gradient is a difference of smoothed
-    /// pixels, so its influence spreads over 4 × 4 raw pixels by (−1 −1 1 1)/4 along and (1 3 3 1)/8 across it.
+    /// The derivative of Σ w g (gᵀr) by one gradient is w·((gᵀr)·1 + g·rᵀ), and M⁻¹ takes it to the corner. A gradient
+    /// is half a difference of 2 × 2 smoothed pixels, so the influence of a smoothed pixel is half the sum, with the
+    /// signs of its place, of those of the four gradients it takes part in; smoothing by (1 2 1)/4 along both axes
+    /// spreads it over the raw pixels.
+    #[inline(always)]
     fn sigma(&mut self, cross: &Cross, q: [f64; 2]) -> Option<f64> {
         let [a, b, c] = self.moments;
         let det = a * c - b * b;
@@ -384,75 +399,84 @@ impl Window {
             return None;
         }
         // Rows and columns of zeros round the influences take what spreads.
-        let n = self.stride + LANES + 3;
-        let size = n * (self.rows + 6);
+        let n = self.stride + LANES + 2;
+        let size = n * (self.rows + 2 * RIM + 1);
         self.work.clear();
-        self.work.resize(4 * size, 0.0);
-        let (x_of_gx, rest) = self.work.split_at_mut(size);
-        let (x_of_gy, rest) = rest.split_at_mut(size);
-        let (y_of_gx, y_of_gy) = rest.split_at_mut(size);
-        let [ia, ib, ic] = [a, b, c].map(|m| (m / det) as f32); // M⁻¹ = [ic −ib; −ib ia]
+        self.work.resize(6 * size, 0.0);
+        let (planes, of_smooth) = self.work.split_at_mut(4 * size);
+        // Influence on both sums, of gx plus gy and of gx minus gy.
+        let (sums, differences) = planes.split_at_mut(2 * size);
+        let ([sum_x, sum_y], [difference_x, difference_y]) =
+            (halves(sums, size), halves(differences, size));
         let first_dx = (self.x0 - q[0]) as f32;
         for y in 0..self.rows {
             let dy = (self.y0 + y as f64 - q[1]) as f32;
-            let gx = &self.gx[y * self.stride..][..self.stride];
-            let gy = &self.gy[y * self.stride..][..self.stride];
-            let at = (y + 3) * n + 3;
-            let n = self.stride;
-            let (x_of_gx, x_of_gy) = (&mut x_of_gx[at..][..n], &mut x_of_gy[at..][..n]);
-            let (y_of_gx, y_of_gy) = (&mut y_of_gx[at..][..n], &mut y_of_gy[at..][..n]);
+            let (at, n) = ((y + RIM) * n + RIM, self.stride);
+            let gx = &self.gx[y * n..][..n];
+            let gy = &self.gy[y * n..][..n];
+            let (sum_x, sum_y) = (&mut sum_x[at..][..n], &mut sum_y[at..][..n]);
+            let difference_x = &mut difference_x[at..][..n];
+            let difference_y = &mut difference_y[at..][..n];
             for x in 0..n {
                 let dx = first_dx + x as f32;
                 let w = cross.weight(dx, dy);
                 let (gx, gy) = (gx[x], gy[x]);
                 let along = gx * dx + gy * dy;
-                // The derivatives of both sums by gx, then by gy.
-                let (first, second) = (w * (along + gx * dx), w * (gy * dx));
-                x_of_gx[x] = ic * first - ib * second;
-                y_of_gx[x] = ia * second - ib * first;
-                let (first, second) = (w * (gx * dy), w * (along + gy * dy));
-                x_of_gy[x] = ic * first - ib * second;
-                y_of_gy[x] = ia * second - ib * first;
+                let (of_gx, of_gy) = (w * (along + gx * dx), w * (gx * dy));
+                (sum_x[x], difference_x[x]) = (of_gx + of_gy, of_gx - of_gy);
+                let (of_gx, of_gy) = (w * (gy * dx), w * (along + gy * dy));
+                (sum_y[x], difference_y[x]) = (of_gx + of_gy, of_gx - of_gy);
             }
         }
-        let variance = spread(n, self.rows + 3, x_of_gx, x_of_gy, &mut self.lines)
-            + spread(n, self.rows + 3, y_of_gx, y_of_gy, &mut self.lines);
-        Some((0.5 * variance).sqrt())
+        let [smooth_x, smooth_y] = halves(of_smooth, size);
+        for (out, sum, difference) in
+            [(&mut *smooth_x, &*sum_x, &*difference_x), (&mut *smooth_y, &*sum_y, &*difference_y)]
+        {
+            // The gradient at the same index lies below and to the right of a smoothed pixel.
+            let m = size - n - 1;
+            let out = &mut out[n + 1..][..m];
+            let (above_left, above) = (&sum[..m], &difference[1..][..m]);
+            let (left, here) = (&difference[n..][..m], &sum[n + 1..][..m]);
+            for i in 0..m {
+                out[i] = (above_left[i] - here[i]) + (left[i] - above[i]);
+            }
+        }
+        self.line.resize(2 * n, 0.0);
+        let [line_x, line_y] = halves(&mut self.line, n);
+        let mut lanes = [[0.0_f32; LANES]; 3];
+        for y in 0..self.rows + 3 {
+            for (line, plane) in [(&mut *line_x, &*smooth_x), (&mut *line_y, &*smooth_y)] {
+                let [a, b, c] = [0, 1, 2].map(|k| &plane[(y + k) * n..][..n]);
+                for (((out, a), b), c) in line.iter_mut().zip(a).zip(b).zip(c) {
+                    *out = (a + c) + 2.0 * b;
+                }
+            }
+            for start in (0..=self.stride).step_by(LANES) {
+                let [x, y] = [&*line_x, &*line_y].map(|line| &line[start..][..LANES + 2]);
+                for k in 0..LANES {
+                    let fx = (x[k] + x[k + 2]) + 2.0 * x[k + 1];
+                    let fy = (y[k] + y[k + 2]) + 2.0 * y[k + 1];
+                    lanes[0][k] += fx * fx;
+                    lanes[1][k] += fx * fy;
+                    lanes[2][k] += fy * fy;
+                }
+            }
+        }
+        let [xx, xy, yy] = lanes.map(|lanes| lanes.iter().map(|&v| f64::from(v)).sum::<f64>());
+        // Trace of M⁻¹ V M⁻¹ with M⁻¹ = [c −b; −b a]/det.
+        let trace = ((c * c + b * b) * xx - 2.0 * b * (a + c) * xy + (a * a + b * b) * yy) / det;
+        // The factors left out above: 1/2 of the gradient, 1/16 of the smoothing.
+        Some((0.5 * trace / det).sqrt() / 32.0)
     }
 }
 
-/// Σ of the squared influences of all raw pixels, from those of the gradients: rows of `n`, with a rim of zeros.
-fn spread(n: usize, rows: usize, of_gx: &[f32], of_gy: &[f32], lines: &mut [Vec<f32>; 2]) -> f64 {
-    let [line_gx, line_gy] = lines;
-    line_gx.resize(n, 0.0);
-    line_gy.resize(n, 0.0);
-    let mut sum = 0.0;
-    for y in 0..rows {
-        let row = |k: usize| (y + k) * n..(y + k + 1) * n;
-        let [a, b, c, d] = [0, 1, 2, 3].map(|k| &of_gx[row(k)]);
-        for ((((out, a), b), c), d) in line_gx.iter_mut().zip(a).zip(b).zip(c).zip(d) {
-            *out = (a + d + 3.0 * (b + c)) * 0.125;
-        }
-        let [a, b, c, d] = [0, 1, 2, 3].map(|k| &of_gy[row(k)]);
-        for ((((out, a), b), c), d) in line_gy.iter_mut().zip(a).zip(b).zip(c).zip(d) {
-            *out = (c + d - a - b) * 0.25;
-        }
-        let mut lanes = [0.0_f32; LANES];
-        let mut x = 0;
-        while x + LANES + 3 <= n {
-            let gx: &[f32] = &line_gx[x..x + LANES + 3];
-            let gy: &[f32] = &line_gy[x..x + LANES + 3];
-            for k in 0..LANES {
-                let from_gx = (gx[k + 2] + gx[k + 3] - gx[k] - gx[k + 1]) * 0.25;
-                let from_gy = (gy[k] + gy[k + 3] + 3.0 * (gy[k + 1] + gy[k + 2])) * 0.125;
-                let influence = from_gx + from_gy;
-                lanes[k] += influence * influence;
-            }
-            x += LANES;
-        }
-        sum += lanes.iter().map(|&v| f64::from(v)).sum::<f64>();
-    }
-    sum
+/// Zeros before the influences, pixels: as far as the smoothing spreads them.
+const RIM: usize = 2;
+
+/// Both halves, of `size` each.
+fn halves(memory: &mut [f32], size: usize) -> [&mut [f32]; 2] {
+    let (first, second) = memory.split_at_mut(size);
+    [first, &mut second[..size]]
 }
 
 /// What rounding to 8 bits adds, grey levels: √(1/12).
@@ -466,24 +490,25 @@ fn noise_sigma(image: &Gray) -> f64 {
     if width < 3 || height < 3 {
         return ROUNDING;
     }
-    // About 8000 places are plenty for a median.
-    let step = (((width * height) as f64 / 8000.0).sqrt() as usize).max(1);
+    // Whole rows, evenly spread, with some thousand pixels together: the median of n is good to 1.2/√n.
+    let n_rows = (PIXELS_FOR_NOISE / width).clamp(16, height.max(16)).min(height - 2);
+    let mut values = vec![0_u16; width - 2];
     let mut histogram = [0_u32; 2041];
-    let mut n = 0_u32;
-    for y in (1..height - 1).step_by(step) {
+    for k in 0..n_rows {
+        let y = 1 + (2 * k + 1) * (height - 2) / (2 * n_rows);
         let [a, b, c] = [y - 1, y, y + 1].map(|y| image.row(y));
-        for x in (1..width - 1).step_by(step) {
-            let p = |row: &[u8], x: usize| i32::from(row[x]);
-            let value = p(a, x - 1) + p(a, x + 1) + p(c, x - 1) + p(c, x + 1)
-                - 2 * (p(a, x) + p(c, x) + p(b, x - 1) + p(b, x + 1))
-                + 4 * p(b, x);
-            histogram[value.unsigned_abs() as usize] += 1;
-            n += 1;
+        vectorized(
+            #[inline(always)]
+            || roughness([a, b, c], &mut values),
+        );
+        for &value in &values {
+            histogram[usize::from(value)] += 1;
         }
     }
+    let n = (n_rows * values.len()) as f64;
     // The median of |N(0, s)| is 0.6745·s; the kernel has a gain of 6. Within a bin the count is spread evenly.
     let mut below = 0.0;
-    let half = f64::from(n) / 2.0;
+    let half = n / 2.0;
     for (value, &count) in histogram.iter().enumerate() {
         if below + f64::from(count) >= half {
             let inside = (half - below) / f64::from(count.max(1));
@@ -493,4 +518,23 @@ fn noise_sigma(image: &Gray) -> f64 {
         below += f64::from(count);
     }
     ROUNDING
+}
+
+/// Pixels looked at for the noise, about.
+const PIXELS_FOR_NOISE: usize = 10_000;
+
+/// Magnitude of the response to Immerkær's kernel (1 −2 1)ᵀ(1 −2 1) for the middle one of three rows.
+#[inline(always)]
+fn roughness([a, b, c]: [&[u8]; 3], out: &mut [u16]) {
+    let n = out.len();
+    let [[a0, a1, a2], [b0, b1, b2], [c0, c1, c2]] =
+        [a, b, c].map(|row| [0, 1, 2].map(|dx| &row[dx..][..n]));
+    let wide = i16::from;
+    for i in 0..n {
+        // At most 16 · 255: it fits.
+        let second = |l: u8, m: u8, r: u8| wide(l) + wide(r) - 2 * wide(m);
+        let value = second(a0[i], a1[i], a2[i]) + second(c0[i], c1[i], c2[i])
+            - 2 * second(b0[i], b1[i], b2[i]);
+        out[i] = value.unsigned_abs();
+    }
 }

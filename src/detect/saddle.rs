@@ -10,7 +10,9 @@
 //! evaluated at every pixel; local maxima are then asked for the four alternations of a chessboard on a ring around
 //! them (the idea of Bennett and Lasenby's ChESS, CVIU 2014), which also gives the directions of the four edges.
 
-use super::pyramid::Level;
+use std::array;
+
+use super::{pyramid::Level, simd::vectorized};
 
 /// A crossing of two edges.
 #[derive(Clone, Copy, Debug)]
@@ -69,30 +71,33 @@ const MIN_RELATIVE_STRENGTH: f32 = 0.005;
 /// The strongest saddle that counts for this is the one of this rank: a few reflections must not set the scale.
 const REFERENCE_RANK: usize = 24;
 
-/// The saddles of a level, strongest first, at most `most`. `response` is memory only.
-pub(super) fn saddles(level: &Level, most: usize, response: &mut Vec<f32>) -> Vec<Saddle> {
-    let (width, height) = (level.width, level.height);
+/// Memory of the search, kept for the next image.
+#[derive(Debug, Default)]
+pub(super) struct Memory {
+    /// The latest rows of the response: row y lies at y modulo [`KEPT_ROWS`].
+    response: Vec<f32>,
+    /// For each pixel of a row whether it is a peak.
+    flags: Vec<u8>,
+    /// Strength and index of the peaks.
+    peaks: Vec<(f32, u32)>,
+}
+
+/// Rows of the response kept: a peak is told from the rows above and below.
+const KEPT_ROWS: usize = 3;
+/// Flags looked at together.
+const FLAGS: usize = 8;
+
+/// The saddles of a level, strongest first, at most `most`.
+pub(super) fn saddles(level: &Level, most: usize, memory: &mut Memory) -> Vec<Saddle> {
     let margin = RING_RADIUS as usize;
-    if width < 2 * margin + 3 || height < 2 * margin + 3 {
+    if level.width < 2 * margin + 3 || level.height < 2 * margin + 3 {
         return Vec::new();
     }
-    fill_response(level, response);
-    let mut peaks: Vec<(f32, u32)> = Vec::new();
-    for y in margin..height - margin {
-        let [above, here, below] = [y - 1, y, y + 1].map(|y| &response[y * width..][..width]);
-        for x in margin..width - margin {
-            let s = here[x];
-            // A strict order among equals, so that a plateau yields one peak.
-            if s > MIN_STRENGTH
-                && s > here[x - 1]
-                && s >= here[x + 1]
-                && above[x - 1..=x + 1].iter().all(|&n| s > n)
-                && below[x - 1..=x + 1].iter().all(|&n| s >= n)
-            {
-                peaks.push((s, (y * width + x) as u32));
-            }
-        }
-    }
+    vectorized(
+        #[inline(always)]
+        || find_peaks(level, memory),
+    );
+    let peaks = &mut memory.peaks;
     if peaks.len() > REFERENCE_RANK {
         let (_, reference, _) =
             peaks.select_nth_unstable_by(REFERENCE_RANK, |a, b| b.0.total_cmp(&a.0));
@@ -102,40 +107,89 @@ pub(super) fn saddles(level: &Level, most: usize, response: &mut Vec<f32>) -> Ve
     // By strength, then by place: the order must not depend on how the sort works.
     peaks.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     peaks.truncate(most);
+    let width = level.width;
     peaks
-        .into_iter()
-        .filter_map(|(_, at)| examine(level, at as usize % width, at as usize / width))
+        .iter()
+        .filter_map(|&(_, at)| examine(level, at as usize % width, at as usize / width))
         .collect()
 }
 
-/// −det H at every pixel but the border's.
-fn fill_response(level: &Level, response: &mut Vec<f32>) {
+/// Local maxima of the response, row by row.
+#[inline(always)]
+fn find_peaks(level: &Level, memory: &mut Memory) {
     let (width, height) = (level.width, level.height);
-    // The border keeps what an earlier image left there; no peak is sought so near it.
-    response.resize(width * height, 0.0);
+    let margin = RING_RADIUS as usize;
+    let Memory { response, flags, peaks } = memory;
+    peaks.clear();
+    response.resize(KEPT_ROWS * width, 0.0);
+    flags.clear();
+    flags.resize(width.next_multiple_of(FLAGS), 0);
     for y in 1..height - 1 {
-        let [a, b, c] = [y - 1, y, y + 1].map(|y| &level.gray[y * width..][..width]);
-        let n = width - 2;
-        let out = &mut response[y * width + 1..][..n];
-        let (a0, a1, a2) = (&a[..n], &a[1..][..n], &a[2..][..n]);
-        let (b0, b1, b2) = (&b[..n], &b[1..][..n], &b[2..][..n]);
-        let (c0, c1, c2) = (&c[..n], &c[1..][..n], &c[2..][..n]);
-        for i in 0..n {
-            let twice = 2.0 * b1[i];
-            let xx = b0[i] + b2[i] - twice;
-            let yy = a1[i] + c1[i] - twice;
-            let xy = 0.25 * ((a0[i] + c2[i]) - (a2[i] + c0[i]));
-            out[i] = xy * xy - xx * yy;
+        response_row(level, y, &mut response[y % KEPT_ROWS * width..][..width]);
+        let middle = y - 1;
+        if middle < margin || middle + margin >= height {
+            continue;
         }
+        let [above, here, below] =
+            [middle - 1, middle, y].map(|y| &response[y % KEPT_ROWS * width..][..width]);
+        flag_peaks([above, here, below], &mut flags[margin..width - margin]);
+        for (chunk, eight) in flags.as_chunks::<FLAGS>().0.iter().enumerate() {
+            if u64::from_le_bytes(*eight) != 0 {
+                for (k, _) in eight.iter().enumerate().filter(|(_, flag)| **flag != 0) {
+                    let x = chunk * FLAGS + k;
+                    peaks.push((here[x], (middle * width + x) as u32));
+                }
+            }
+        }
+    }
+}
+
+/// −det H at every pixel of a row but its ends.
+#[inline(always)]
+fn response_row(level: &Level, y: usize, out: &mut [f32]) {
+    let width = level.width;
+    let [a, b, c] = [y - 1, y, y + 1].map(|y| &level.gray[y * width..][..width]);
+    let n = width - 2;
+    let out = &mut out[1..][..n];
+    let (a0, a1, a2) = (&a[..n], &a[1..][..n], &a[2..][..n]);
+    let (b0, b1, b2) = (&b[..n], &b[1..][..n], &b[2..][..n]);
+    let (c0, c1, c2) = (&c[..n], &c[1..][..n], &c[2..][..n]);
+    for i in 0..n {
+        let twice = 2.0 * b1[i];
+        let xx = b0[i] + b2[i] - twice;
+        let yy = a1[i] + c1[i] - twice;
+        let xy = 0.25 * ((a0[i] + c2[i]) - (a2[i] + c0[i]));
+        out[i] = xy * xy - xx * yy;
+    }
+}
+
+/// Flags the pixels that exceed [`MIN_STRENGTH`] and their eight neighbours. The flags are those of the middle of the
+/// rows: as many as they have pixels but for [`RING_RADIUS`] at each end.
+#[inline(always)]
+fn flag_peaks(rows: [&[f32]; 3], flags: &mut [u8]) {
+    let (n, first) = (flags.len(), RING_RADIUS as usize - 1);
+    let [[a0, a1, a2], [b0, b1, b2], [c0, c1, c2]] =
+        rows.map(|row| [0, 1, 2].map(|dx| &row[first + dx..][..n]));
+    // Not `f32::max`, which must mind NaN.
+    let max = |a: f32, b: f32| if a > b { a } else { b };
+    for i in 0..n {
+        let s = b1[i];
+        // A strict order among equals, so that a plateau yields one peak.
+        let before = max(max(max(a0[i], a1[i]), a2[i]), max(b0[i], MIN_STRENGTH));
+        let after = max(max(max(c0[i], c1[i]), c2[i]), b2[i]);
+        flags[i] = u8::from(s > before && s >= after);
     }
 }
 
 /// The saddle at a peak of the response; `None` where its surroundings are not those of a chessboard's corner.
 fn examine(level: &Level, x: usize, y: usize) -> Option<Saddle> {
-    let width = level.width;
-    let at = |dx: isize, dy: isize| {
-        level.gray[(y as isize + dy) as usize * width + (x as isize + dx) as usize]
-    };
+    const R: usize = RING_RADIUS as usize;
+    // Rows of the neighbourhood, so that its pixels need no check each.
+    let rows: [&[f32; 2 * R + 1]; 2 * R + 1] = array::from_fn(|k| {
+        let start = (y + k - R) * level.width + x - R;
+        level.gray[start..].first_chunk().expect("a peak keeps its ring within the level")
+    });
+    let at = |dx: isize, dy: isize| rows[(dy + RING_RADIUS) as usize][(dx + RING_RADIUS) as usize];
     // The saddle of the quadratic through the 3x3 neighbourhood.
     let c = at(0, 0);
     let (gx, gy) = (0.5 * (at(1, 0) - at(-1, 0)), 0.5 * (at(0, 1) - at(0, -1)));
@@ -152,25 +206,19 @@ fn examine(level: &Level, x: usize, y: usize) -> Option<Saddle> {
 
     let ring = RING.map(|(dx, dy)| at(dx, dy));
     let middle = c + 0.5 * (gx * dx + gy * dy); // The value at the saddle itself.
-    let mut crossings = [0.0_f32; 4];
-    let mut n = 0;
-    let mut first_is_bright = false;
-    for k in 0..16 {
-        let (a, b) = (ring[k] - middle, ring[(k + 1) % 16] - middle);
-        if (a > 0.0) != (b > 0.0) {
-            if n == 4 {
-                return None;
-            }
-            if n == 0 {
-                first_is_bright = b > 0.0;
-            }
-            crossings[n] = k as f32 + a / (a - b);
-            n += 1;
-        }
-    }
-    if n != 4 {
+    let bright = (0..16).fold(0_u16, |bits, k| bits | u16::from(ring[k] > middle) << k);
+    // Bit k: the ring crosses the middle between k and k + 1.
+    let mut changes = bright ^ bright.rotate_right(1);
+    if changes.count_ones() != 4 {
         return None;
     }
+    let first_is_bright = bright >> ((changes.trailing_zeros() + 1) % 16) & 1 == 1;
+    let crossings: [f32; 4] = array::from_fn(|_| {
+        let k = changes.trailing_zeros() as usize;
+        changes &= changes - 1;
+        let (a, b) = (ring[k] - middle, ring[(k + 1) % 16] - middle);
+        k as f32 + a / (a - b)
+    });
     // Every sector must be clearly bright or dark, and wide enough.
     let mut weakest = f32::INFINITY;
     let (mut bright, mut dark) = (f32::INFINITY, f32::INFINITY);
