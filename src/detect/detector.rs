@@ -8,7 +8,7 @@ use super::{
     Corner, Identity, Observation, Reason, Reject,
     identify::{Expected, NotIdentified, Placement},
     lattice::{Lattice, lattices},
-    map::SmoothMap,
+    map::{SmoothMap, length},
     pyramid::Level,
     refine::{Guess, Scales, Window, refine},
     saddle::{self, saddles},
@@ -226,7 +226,7 @@ impl Detector {
         contrast: f64,
     ) -> Result<(Pixel, f64), Reason> {
         let rim = (1.0 - self.board.marker_m / self.board.square_m) / 2.0;
-        let spacing = axes[0][0].hypot(axes[0][1]).min(axes[1][0].hypot(axes[1][1]));
+        let spacing = length(axes[0]).min(length(axes[1]));
         let reach = (0.2 * spacing).clamp(1.5, 6.0);
         let guess = Guess { pixel: predicted, axes, rim, contrast };
         let refined = refine(scales, &guess, reach).ok_or(Reason::NoCrossing)?;
@@ -306,7 +306,7 @@ fn inside(image: &Gray, p: Pixel) -> bool {
 
 /// True where the four squares round a corner alternate in colour.
 fn is_crossing(image: &Gray, at: Pixel, [u, v]: [[f64; 2]; 2], rim: f64) -> bool {
-    let spacing = u[0].hypot(u[1]).min(v[0].hypot(v[1]));
+    let spacing = length(u).min(length(v));
     let d = (0.75 * rim).max(1.5 / spacing).min(0.3);
     let sample = |a: f64, b: f64| {
         image.bilinear(Pixel::new(

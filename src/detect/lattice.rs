@@ -9,7 +9,12 @@ use std::collections::{BTreeSet, VecDeque};
 
 use crate::geom::Pixel;
 
-use super::{map::SmoothMap, pyramid::Level, saddle::Saddle};
+use super::{
+    map::{SmoothMap, length},
+    pyramid::Level,
+    saddle::Saddle,
+    simd::vectorized,
+};
 
 /// Corners numbered along two axes. In the image, the axis j lies clockwise of i, as y lies of x.
 #[derive(Clone, Debug)]
@@ -60,7 +65,7 @@ impl Lattice {
                 let (Some(at), Some([u, v])) = (map.at(x, y), map.axes(x, y)) else {
                     return f64::INFINITY;
                 };
-                at.distance(node.pixel) / u[0].hypot(u[1]).min(v[0].hypot(v[1]))
+                at.distance(node.pixel) / length(u).min(length(v))
             };
             let worst =
                 self.nodes.iter().map(misfit).enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
@@ -120,7 +125,10 @@ const MIN_STEP: f32 = 0.25;
 
 /// Lattices with at least `min_nodes` nodes, largest first.
 pub(super) fn lattices(level: &Level, saddles: &[Saddle], min_nodes: usize) -> Vec<Lattice> {
-    let links = links(level, saddles);
+    let links = vectorized(
+        #[inline(always)]
+        || links(level, saddles),
+    );
     let mut taken = vec![false; saddles.len()];
     let mut found = Vec::new();
     // Saddles come strongest first: numbering starts where the image is clearest.
@@ -140,8 +148,9 @@ pub(super) fn lattices(level: &Level, saddles: &[Saddle], min_nodes: usize) -> V
 type Link = Option<(u32, u8)>;
 
 /// For every saddle and edge the neighbour that agrees.
+#[inline(always)]
 fn links(level: &Level, saddles: &[Saddle]) -> Vec<[Link; 4]> {
-    let grid = Buckets::new(level, saddles);
+    let mut grid = Buckets::new(level, saddles);
     let mut one_way: Vec<[Link; 4]> = vec![[None; 4]; saddles.len()];
     let mut near: [Vec<Near>; 4] = Default::default();
     for (p, links) in one_way.iter_mut().enumerate() {
@@ -259,44 +268,70 @@ fn grow(
 
 /// Saddles by place.
 struct Buckets {
-    size: f32,
     columns: usize,
     rows: usize,
     /// Where each bucket starts in `members`.
     starts: Vec<u32>,
+    /// Saddles, bucket by bucket, and their places.
     members: Vec<u32>,
+    x: Vec<f32>,
+    y: Vec<f32>,
+    /// For each member looked at, in which edges' directions it lies: memory only.
+    flags: Vec<u8>,
 }
+
+/// Side of a bucket, pixels of the level.
+const BUCKET: f32 = 16.0;
 
 impl Buckets {
     fn new(level: &Level, saddles: &[Saddle]) -> Self {
-        let size = 16.0;
-        let columns = level.width / 16 + 1;
-        let rows = level.height / 16 + 1;
-        let bucket = |s: &Saddle| {
-            let column = ((s.x.max(0.0) / size) as usize).min(columns - 1);
-            let row = ((s.y.max(0.0) / size) as usize).min(rows - 1);
-            row * columns + column
+        let mut grid = Self {
+            columns: level.width / BUCKET as usize + 1,
+            rows: level.height / BUCKET as usize + 1,
+            starts: Vec::new(),
+            members: vec![0; saddles.len()],
+            x: vec![0.0; saddles.len()],
+            y: vec![0.0; saddles.len()],
+            flags: Vec::new(),
         };
-        let mut starts = vec![0_u32; columns * rows + 1];
+        let mut starts = vec![0_u32; grid.columns * grid.rows + 1];
+        let bucket = |s: &Saddle| {
+            let (column, row) = grid.place(s);
+            row * grid.columns + column
+        };
         for s in saddles {
             starts[bucket(s) + 1] += 1;
         }
-        for b in 0..columns * rows {
+        for b in 0..grid.columns * grid.rows {
             starts[b + 1] += starts[b];
         }
         let mut next = starts.clone();
-        let mut members = vec![0_u32; saddles.len()];
-        for (index, s) in saddles.iter().enumerate() {
-            let slot = &mut next[bucket(s)];
-            members[*slot as usize] = index as u32;
-            *slot += 1;
+        let slots: Vec<usize> = saddles
+            .iter()
+            .map(|s| {
+                let slot = &mut next[bucket(s)];
+                *slot += 1;
+                *slot as usize - 1
+            })
+            .collect();
+        for (index, (s, slot)) in saddles.iter().zip(slots).enumerate() {
+            grid.members[slot] = index as u32;
+            (grid.x[slot], grid.y[slot]) = (s.x, s.y);
         }
-        Self { size, columns, rows, starts, members }
+        grid.starts = starts;
+        grid
+    }
+
+    /// Column and row of a saddle's bucket.
+    fn place(&self, s: &Saddle) -> (usize, usize) {
+        let column = ((s.x.max(0.0) / BUCKET) as usize).min(self.columns - 1);
+        (column, ((s.y.max(0.0) / BUCKET) as usize).min(self.rows - 1))
     }
 
     /// The saddles within `reach` buckets of `p` that lie in the direction of its edges, for those that are open.
+    #[inline(always)]
     fn near(
-        &self,
+        &mut self,
         saddles: &[Saddle],
         p: usize,
         reach: usize,
@@ -305,27 +340,48 @@ impl Buckets {
     ) {
         out.iter_mut().for_each(Vec::clear);
         let here = &saddles[p];
-        let column = ((here.x.max(0.0) / self.size) as usize).min(self.columns - 1);
-        let row = ((here.y.max(0.0) / self.size) as usize).min(self.rows - 1);
+        let (column, row) = self.place(here);
         for r in row.saturating_sub(reach)..=(row + reach).min(self.rows - 1) {
-            let from = column.saturating_sub(reach);
-            let to = (column + reach).min(self.columns - 1);
-            let range =
-                self.starts[r * self.columns + from]..self.starts[r * self.columns + to + 1];
-            for &q in &self.members[range.start as usize..range.end as usize] {
-                let there = &saddles[q as usize];
-                let (dx, dy) = (there.x - here.x, there.y - here.y);
-                let square = dx * dx + dy * dy;
-                if square < MIN_SPACING * MIN_SPACING {
-                    continue; // Itself, too.
+            let first = self.starts[r * self.columns + column.saturating_sub(reach)] as usize;
+            let last = (column + reach).min(self.columns - 1);
+            let end = self.starts[r * self.columns + last + 1] as usize;
+            let (x, y) = (&self.x[first..end], &self.y[first..end]);
+            self.flags.clear();
+            self.flags.resize((end - first).next_multiple_of(8), 0);
+            flag_directions(here, x, y, &mut self.flags[..end - first]);
+            for (chunk, eight) in self.flags.as_chunks::<8>().0.iter().enumerate() {
+                if u64::from_le_bytes(*eight) == 0 {
+                    continue;
                 }
-                for k in 0..4 {
-                    let along = dx * here.edges[k][0] + dy * here.edges[k][1];
-                    if open[k] && along > 0.0 && along * along >= MIN_COS * MIN_COS * square {
-                        out[k].push(Near { q, offset: [dx, dy], square });
+                for (i, flag) in eight.iter().enumerate().filter(|(_, flag)| **flag != 0) {
+                    let i = 8 * chunk + i;
+                    let (dx, dy) = (x[i] - here.x, y[i] - here.y);
+                    let q = self.members[first + i];
+                    let near = Near { q, offset: [dx, dy], square: dx * dx + dy * dy };
+                    for k in 0..4 {
+                        if open[k] && flag >> k & 1 == 1 {
+                            out[k].push(near);
+                        }
                     }
                 }
             }
         }
+    }
+}
+
+/// Sets bit k where a place lies in the direction of edge k and not too near.
+#[inline(always)]
+fn flag_directions(here: &Saddle, x: &[f32], y: &[f32], flags: &mut [u8]) {
+    for ((&x, &y), flag) in x.iter().zip(y).zip(flags) {
+        let (dx, dy) = (x - here.x, y - here.y);
+        let square = dx * dx + dy * dy;
+        let least = MIN_COS * MIN_COS * square;
+        let mut bits = 0;
+        for k in 0..4 {
+            let along = dx * here.edges[k][0] + dy * here.edges[k][1];
+            // Its magnitude with its sign: one comparison for both conditions.
+            bits |= u8::from(along * along.abs() >= least) << k;
+        }
+        *flag = if square >= MIN_SPACING * MIN_SPACING { bits } else { 0 };
     }
 }

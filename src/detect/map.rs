@@ -193,6 +193,11 @@ impl SmoothMap {
     }
 }
 
+/// Length of a vector of pixels: not `hypot`, which guards against overflow at many times the cost.
+pub(super) fn length([x, y]: [f64; 2]) -> f64 {
+    (x * x + y * y).sqrt()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

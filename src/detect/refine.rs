@@ -16,7 +16,7 @@
 
 use crate::{geom::Pixel, image::Gray};
 
-use super::{pyramid::Level, simd::vectorized};
+use super::{map::length, pyramid::Level, simd::vectorized};
 
 /// A corner to refine.
 #[derive(Clone, Copy, Debug)]
@@ -111,7 +111,7 @@ const SHARP: f64 = 5.0;
 pub(super) fn refine(scales: &mut Scales<'_>, guess: &Guess, reach_px: f64) -> Option<Refined> {
     let [u, v] = guess.axes;
     let det = (u[0] * v[1] - u[1] * v[0]).abs();
-    let across = [det / u[0].hypot(u[1]), det / v[0].hypot(v[1])];
+    let across = [det / length(u), det / length(v)];
     if !(across[0] > 1.5 && across[1] > 1.5) {
         return None;
     }
@@ -148,7 +148,7 @@ fn refine_at(
 ) -> Option<Refined> {
     let [u, v] = guess.axes;
     let det = u[0] * v[1] - u[1] * v[0];
-    let (lu, lv) = (u[0].hypot(u[1]), v[0].hypot(v[1]));
+    let (lu, lv) = (length(u), length(v));
     if !(det.abs() > 0.05 * lu * lv && lu > 2.0 && lv > 2.0) {
         return None;
     }
@@ -200,9 +200,9 @@ fn iterate(
             center = Some((cx, cy));
         }
         let next = window.solve(cross, q)?;
-        let moved = (next[0] - q[0]).hypot(next[1] - q[1]);
+        let moved = length([next[0] - q[0], next[1] - q[1]]);
         q = next;
-        if !((q[0] - from.x).hypot(q[1] - from.y) <= reach_px) {
+        if !(length([q[0] - from.x, q[1] - from.y]) <= reach_px) {
             return None;
         }
         if moved < CONVERGED || (step + 1 == MOST_STEPS && moved < 0.05) {
@@ -215,8 +215,11 @@ fn iterate(
     None
 }
 
+/// Below this width the blur asks for nothing, pixels: 1.25 times it still lies within [`SHARP_REACH`].
+const NO_BLUR: f64 = (SHARP_REACH - CLEAN_REACH) / BLUR_WIDTHS;
+
 /// Width of the blur across the edge along `edge`, pixels: how far it takes the grey values to go from 15 % to 85 % of
-/// the step, over 0.7, on the better of the edge's two halves. `across` is the distance that one of `other` spans at
+/// the step, over 0.7, on the better of the edge's two halves. The first half that is sharp enough to need no widening is enough. `across` is the distance that one of `other` spans at
 /// right angles to the edge. 0 where no edge is seen.
 fn blur_width(image: &Gray, guess: &Guess, edge: [f64; 2], other: [f64; 2], across: f64) -> f64 {
     const STEPS: usize = 12;
@@ -241,6 +244,9 @@ fn blur_width(image: &Gray, guess: &Guess, edge: [f64; 2], other: [f64; 2], acro
         };
         if let (Some(low), Some(high)) = (crossing(0.15), crossing(0.85)) {
             let width = (high - low) * step * across / 0.7;
+            if width <= NO_BLUR {
+                return width;
+            }
             narrowest = Some(narrowest.map_or(width, |n: f64| n.min(width)));
         }
     }
@@ -288,8 +294,9 @@ pub(super) struct Window {
     gy: Vec<f32>,
     /// Smoothed pixels, then the influences of gradients: memory only.
     work: Vec<f32>,
+    /// Influences of smoothed pixels: memory only.
+    smooth: Vec<f32>,
     column: Vec<u16>,
-    line: Vec<f32>,
     /// Σ w gx², Σ w gx gy, Σ w gy² of the last step.
     moments: [f64; 3],
 }
@@ -310,20 +317,22 @@ impl Window {
         let n = columns + 1;
         self.work.resize(n * (rows + 1), 0.0);
         self.column.resize(n + 2, 0);
+        let (left, right) = (x0.saturating_sub(1), (x0 + n + 1).min(image.width()));
+        let first = left + 1 - x0;
         for (y, out) in self.work.chunks_exact_mut(n).enumerate() {
             let y = y0 + y;
             let [a, b, c] = [y.saturating_sub(1), y, (y + 1).min(image.height() - 1)]
-                .map(|y| &image.row(y)[x0..x0 + n]);
-            for (((out, a), b), c) in self.column[1..=n].iter_mut().zip(a).zip(b).zip(c) {
-                *out = u16::from(*a) + 2 * u16::from(*b) + u16::from(*c);
+                .map(|y| &image.row(y)[left..right]);
+            let column = &mut self.column[first..][..right - left];
+            for i in 0..right - left {
+                column[i] = u16::from(a[i]) + 2 * u16::from(b[i]) + u16::from(c[i]);
             }
-            let beyond = |x: usize| {
-                let [a, b, c] = [y.saturating_sub(1), y, (y + 1).min(image.height() - 1)]
-                    .map(|y| u16::from(image.row(y)[x]));
-                a + 2 * b + c
-            };
-            self.column[0] = beyond(x0.saturating_sub(1));
-            self.column[n + 1] = beyond((x0 + n).min(image.width() - 1));
+            if first == 1 {
+                self.column[0] = self.column[1];
+            }
+            if right < x0 + n + 1 {
+                self.column[n + 1] = self.column[n];
+            }
             let (l, m, r) = (&self.column[..n], &self.column[1..][..n], &self.column[2..][..n]);
             for (((out, l), m), r) in out.iter_mut().zip(l).zip(m).zip(r) {
                 *out = f32::from(l + 2 * m + r) * (1.0 / 16.0);
@@ -398,20 +407,21 @@ impl Window {
         if !(det > 0.0) {
             return None;
         }
-        // Rows and columns of zeros round the influences take what spreads.
-        let n = self.stride + LANES + 2;
-        let size = n * (self.rows + 2 * RIM + 1);
+        // Planes with two rows and columns of zeros before the influences and three after them, which take what
+        // spreads: what runs over the end of a row meets the zeros of the next.
+        let n = self.stride + 5;
+        let size = n * (self.rows + 5);
         self.work.clear();
-        self.work.resize(6 * size, 0.0);
-        let (planes, of_smooth) = self.work.split_at_mut(4 * size);
+        self.work.resize(4 * size, 0.0);
+        self.smooth.resize(2 * size, 0.0);
         // Influence on both sums, of gx plus gy and of gx minus gy.
-        let (sums, differences) = planes.split_at_mut(2 * size);
+        let (sums, differences) = self.work.split_at_mut(2 * size);
         let ([sum_x, sum_y], [difference_x, difference_y]) =
             (halves(sums, size), halves(differences, size));
         let first_dx = (self.x0 - q[0]) as f32;
         for y in 0..self.rows {
             let dy = (self.y0 + y as f64 - q[1]) as f32;
-            let (at, n) = ((y + RIM) * n + RIM, self.stride);
+            let (at, n) = ((y + 2) * n + 2, self.stride);
             let gx = &self.gx[y * n..][..n];
             let gy = &self.gy[y * n..][..n];
             let (sum_x, sum_y) = (&mut sum_x[at..][..n], &mut sum_y[at..][..n]);
@@ -428,38 +438,26 @@ impl Window {
                 (sum_y[x], difference_y[x]) = (of_gx + of_gy, of_gx - of_gy);
             }
         }
-        let [smooth_x, smooth_y] = halves(of_smooth, size);
-        for (out, sum, difference) in
-            [(&mut *smooth_x, &*sum_x, &*difference_x), (&mut *smooth_y, &*sum_y, &*difference_y)]
-        {
-            // The gradient at the same index lies below and to the right of a smoothed pixel.
-            let m = size - n - 1;
-            let out = &mut out[n + 1..][..m];
-            let (above_left, above) = (&sum[..m], &difference[1..][..m]);
-            let (left, here) = (&difference[n..][..m], &sum[n + 1..][..m]);
-            for i in 0..m {
-                out[i] = (above_left[i] - here[i]) + (left[i] - above[i]);
-            }
-        }
-        self.line.resize(2 * n, 0.0);
-        let [line_x, line_y] = halves(&mut self.line, n);
+        let [smooth_x, smooth_y] = halves(&mut self.smooth, size);
+        spread(sum_x, difference_x, smooth_x, n);
+        spread(sum_y, difference_y, smooth_y, n);
+        // Raw pixels: (1 2 1) along y and then along x, each into the planes that are free again.
+        let m = n * (self.rows + 3);
+        one_two_one(smooth_x, &mut difference_x[..m], n);
+        one_two_one(smooth_y, &mut difference_y[..m], n);
+        one_two_one(difference_x, &mut sum_x[..m - 2], 1);
+        one_two_one(difference_y, &mut sum_y[..m - 2], 1);
+        // What the last lanes take in too much is zero.
+        let used = (m - 2).next_multiple_of(LANES);
+        sum_x[m - 2..used].fill(0.0);
+        sum_y[m - 2..used].fill(0.0);
         let mut lanes = [[0.0_f32; LANES]; 3];
-        for y in 0..self.rows + 3 {
-            for (line, plane) in [(&mut *line_x, &*smooth_x), (&mut *line_y, &*smooth_y)] {
-                let [a, b, c] = [0, 1, 2].map(|k| &plane[(y + k) * n..][..n]);
-                for (((out, a), b), c) in line.iter_mut().zip(a).zip(b).zip(c) {
-                    *out = (a + c) + 2.0 * b;
-                }
-            }
-            for start in (0..=self.stride).step_by(LANES) {
-                let [x, y] = [&*line_x, &*line_y].map(|line| &line[start..][..LANES + 2]);
-                for k in 0..LANES {
-                    let fx = (x[k] + x[k + 2]) + 2.0 * x[k + 1];
-                    let fy = (y[k] + y[k + 2]) + 2.0 * y[k + 1];
-                    lanes[0][k] += fx * fx;
-                    lanes[1][k] += fx * fy;
-                    lanes[2][k] += fy * fy;
-                }
+        let (sum_x, sum_y) = (&sum_x[..used], &sum_y[..used]);
+        for (fx, fy) in sum_x.as_chunks::<LANES>().0.iter().zip(sum_y.as_chunks::<LANES>().0) {
+            for k in 0..LANES {
+                lanes[0][k] += fx[k] * fx[k];
+                lanes[1][k] += fx[k] * fy[k];
+                lanes[2][k] += fy[k] * fy[k];
             }
         }
         let [xx, xy, yy] = lanes.map(|lanes| lanes.iter().map(|&v| f64::from(v)).sum::<f64>());
@@ -470,8 +468,30 @@ impl Window {
     }
 }
 
-/// Zeros before the influences, pixels: as far as the smoothing spreads them.
-const RIM: usize = 2;
+/// Influences of smoothed pixels, without the factor 1/2, from those of the gradients: rows of `n`. The gradient at the
+/// index of a smoothed pixel lies below and to the right of it.
+#[inline(always)]
+fn spread(sum: &[f32], difference: &[f32], smooth: &mut [f32], n: usize) {
+    let m = sum.len() - n - 1;
+    let (zeros, out) = smooth.split_at_mut(n + 1);
+    zeros.fill(0.0);
+    let out = &mut out[..m];
+    let (above_left, above) = (&sum[..m], &difference[1..][..m]);
+    let (left, here) = (&difference[n..][..m], &sum[n + 1..][..m]);
+    for i in 0..m {
+        out[i] = (above_left[i] - here[i]) + (left[i] - above[i]);
+    }
+}
+
+/// (1 2 1) at distances of `step`.
+#[inline(always)]
+fn one_two_one(from: &[f32], to: &mut [f32], step: usize) {
+    let n = to.len();
+    let (a, b, c) = (&from[..n], &from[step..][..n], &from[2 * step..][..n]);
+    for i in 0..n {
+        to[i] = (a[i] + c[i]) + 2.0 * b[i];
+    }
+}
 
 /// Both halves, of `size` each.
 fn halves(memory: &mut [f32], size: usize) -> [&mut [f32]; 2] {
