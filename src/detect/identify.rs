@@ -543,33 +543,31 @@ const SAMPLES_PER_VOTE: f64 = 4.0;
 /// person can read lie above 0.2.
 const MIN_BLUR_LEAD: f64 = 0.12;
 
+/// Entries of the lower triangle of a normal matrix, row by row.
+const TRIANGLE: usize = TAPS * (TAPS + 1) / 2;
+
+/// A normal matrix of markers: its entries are sums of products of ±1, exact in 32 bits.
+type Normal = [f32; TRIANGLE];
+
 /// The kernel that explains all samples added.
 struct BlurFit {
-    normal: nalgebra::SMatrix<f64, TAPS, TAPS>,
-    right: nalgebra::SVector<f64, TAPS>,
+    normal: Box<Normal>,
+    right: [f64; TAPS],
     energy: f64,
     n_samples: f64,
 }
 
 impl Default for BlurFit {
     fn default() -> Self {
-        Self {
-            normal: nalgebra::SMatrix::zeros(),
-            right: nalgebra::SVector::zeros(),
-            energy: 0.0,
-            n_samples: 0.0,
-        }
+        Self { normal: Box::new([0.0; TRIANGLE]), right: [0.0; TAPS], energy: 0.0, n_samples: 0.0 }
     }
 }
 
 impl BlurFit {
-    fn add(
-        &mut self,
-        normal: &nalgebra::SMatrix<f64, TAPS, TAPS>,
-        right: &[f64; TAPS],
-        samples: &[f32],
-    ) {
-        self.normal += normal;
+    fn add(&mut self, normal: &Normal, right: &[f64; TAPS], samples: &[f32]) {
+        for (sum, part) in self.normal.iter_mut().zip(normal) {
+            *sum += part;
+        }
         for (sum, part) in self.right.iter_mut().zip(right) {
             *sum += part;
         }
@@ -578,14 +576,34 @@ impl BlurFit {
     }
 
     /// −ln of the mean squared residual.
-    fn score(mut self) -> f64 {
-        for t in 0..TAPS {
-            self.normal[(t, t)] += 1e-3 * self.n_samples;
+    fn score(self) -> f64 {
+        let mut normal = nalgebra::SMatrix::<f64, TAPS, TAPS>::zeros();
+        let mut entries = self.normal.iter();
+        for i in 0..TAPS {
+            for (j, entry) in (0..=i).zip(&mut entries) {
+                normal[(i, j)] = f64::from(*entry);
+            }
+            normal[(i, i)] += 1e-3 * self.n_samples;
         }
-        let Some(cholesky) = self.normal.cholesky() else { return f64::NEG_INFINITY };
-        let kernel = cholesky.solve(&self.right);
-        let residual = (self.energy - kernel.dot(&self.right)).max(1e-6 * self.energy);
+        // The lower triangle is all that the decomposition reads: L y = b, and the explained energy is |y|².
+        let Some(cholesky) = normal.cholesky() else { return f64::NEG_INFINITY };
+        let right = nalgebra::SVector::<f64, TAPS>::from(self.right);
+        let Some(y) = cholesky.l_dirty().solve_lower_triangular(&right) else {
+            return f64::NEG_INFINITY;
+        };
+        let explained = y.norm_squared();
+        let residual = (self.energy - explained).max(1e-6 * self.energy);
         -(residual / self.n_samples).ln()
+    }
+}
+
+/// Adds the outer product of the taps with themselves.
+fn add_products(normal: &mut Normal, taps: &[f32; TAPS]) {
+    let mut entries = normal.iter_mut();
+    for i in 0..TAPS {
+        for (tap, entry) in taps[..=i].iter().zip(&mut entries) {
+            *entry += taps[i] * tap;
+        }
     }
 }
 
@@ -595,7 +613,7 @@ struct BlurModel {
     /// For each marker, sample and tap: the expected value.
     shifted: Vec<f32>,
     /// For each marker the normal matrix of its samples.
-    normals: Vec<nalgebra::SMatrix<f64, TAPS, TAPS>>,
+    normals: Vec<Normal>,
     n2: usize,
 }
 
@@ -605,7 +623,7 @@ impl BlurModel {
         let mut shifted = Vec::with_capacity(expected.n_used * n2 * TAPS);
         let mut normals = Vec::with_capacity(expected.n_used);
         for id in 0..expected.n_used {
-            let mut normal = nalgebra::SMatrix::<f64, TAPS, TAPS>::zeros();
+            let mut normal = [0.0; TRIANGLE];
             for row in 0..size {
                 for column in 0..size {
                     let mut taps = [1.0_f32; TAPS];
@@ -620,17 +638,14 @@ impl BlurModel {
                             1.0
                         };
                     }
-                    let v = nalgebra::SVector::<f64, TAPS>::from_iterator(
-                        taps.iter().map(|&t| f64::from(t)),
-                    );
-                    normal.ger(1.0, &v, &v, 1.0);
+                    add_products(&mut normal, &taps);
                     shifted.extend(taps);
                 }
             }
             normals.push(normal);
         }
         // The mean marker.
-        let mut normal = nalgebra::SMatrix::<f64, TAPS, TAPS>::zeros();
+        let mut normal = [0.0; TRIANGLE];
         for sample in 0..n2 {
             let mut mean = [0.0_f32; TAPS];
             for id in 0..expected.n_used {
@@ -639,9 +654,7 @@ impl BlurModel {
                     *m += t / expected.n_used as f32;
                 }
             }
-            let v =
-                nalgebra::SVector::<f64, TAPS>::from_iterator(mean.iter().map(|&t| f64::from(t)));
-            normal.ger(1.0, &v, &v, 1.0);
+            add_products(&mut normal, &mean);
             shifted.extend(mean);
         }
         normals.push(normal);

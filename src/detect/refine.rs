@@ -82,6 +82,8 @@ const SHARP_REACH: f64 = 7.0;
 const CLEAN_REACH: f64 = 4.5;
 /// Widths of the blur that the sum takes in, to each side of an edge and along the other.
 const BLUR_WIDTHS: f64 = 1.25;
+/// A reach of [`SHARP_REACH`] that rounding has made longer needs no wider window, pixels.
+const ROUNDED: f64 = 1e-6;
 /// Longest reach, pixels: bounds the cost.
 const MAX_REACH: f64 = 40.0;
 /// Reach along an edge, in squares: short of the neighbouring corner.
@@ -173,8 +175,8 @@ fn refine_at(
         // Across the edge along u one moves along v.
         width: [width_v, width_u].map(|v| 1.0 / v as f32),
     };
-    let half =
-        (along_u.max(width_v) * lu).max(along_v.max(width_u) * lv).min(MAX_REACH).ceil() as i64 + 1;
+    let half = (along_u.max(width_v) * lu).max(along_v.max(width_u) * lv).min(MAX_REACH) - ROUNDED;
+    let half = half.ceil() as i64 + 1;
     vectorized(
         #[inline(always)]
         || iterate(image, window, &cross, half, guess.pixel, reach_px),

@@ -104,14 +104,23 @@ pub(super) fn saddles(level: &Level, most: usize, memory: &mut Memory) -> Vec<Sa
         let least = MIN_RELATIVE_STRENGTH * reference.0;
         peaks.retain(|peak| peak.0 > least);
     }
-    // By strength, then by place: the order must not depend on how the sort works.
-    peaks.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    peaks.truncate(most);
+    // By strength, then by place: the order must not depend on how the sort works. Most peaks are noise: only what
+    // is left of them is sorted.
+    let order = |a: &(f32, u32), b: &(f32, u32)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
+    if peaks.len() > most {
+        peaks.select_nth_unstable_by(most, order);
+        peaks.truncate(most);
+    }
     let width = level.width;
-    peaks
+    let mut found: Vec<((f32, u32), Saddle)> = peaks
         .iter()
-        .filter_map(|&(_, at)| examine(level, at as usize % width, at as usize / width))
-        .collect()
+        .filter_map(|&peak| {
+            let at = peak.1 as usize;
+            Some((peak, examine(level, at % width, at / width)?))
+        })
+        .collect();
+    found.sort_unstable_by(|a, b| order(&a.0, &b.0));
+    found.into_iter().map(|(_, saddle)| saddle).collect()
 }
 
 /// Local maxima of the response, row by row.
