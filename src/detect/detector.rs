@@ -50,7 +50,7 @@ const MIN_NODES: usize = 6;
 /// Lattices tried on one level, largest first.
 const MOST_LATTICES: usize = 4;
 /// The shorter side of the coarsest level tried, pixels.
-const COARSEST: usize = 120;
+const COARSEST: usize = 60;
 /// Rounds of looking for corners that the last round brought into reach.
 const MOST_PASSES: usize = 4;
 /// A corner whose σ exceeds this is of no use, pixels.

@@ -11,15 +11,8 @@
 //!
 //! with g and σ estimated under the best placement, and the sum divided by the number of bits that blur makes one.
 //!
-//! Where motion smears the bits over their neighbours that is not enough. Then the picture is explained as the
-//! expected pattern under an *unknown* blur: one kernel of 7 × 7 bits, the same for all cells, fitted by least squares
-//! for each placement in question. The placement that leaves the least residual wins by
-//!
-//! ```text
-//! log p(v | A) − log p(v | B) = N/2·(ln RSS_B − ln RSS_A),
-//! ```
-//!
-//! N being the number of independent samples. It is blind deconvolution with a finite list of candidate images.
+//! Where motion smears the bits over their neighbours that is not enough; `blurred` explains the picture under an
+//! unknown blur then.
 
 use std::{array, ops::Range, sync::OnceLock};
 
@@ -29,7 +22,11 @@ use crate::{
     image::Gray,
 };
 
-use super::{lattice::Lattice, map::SmoothMap};
+use super::{
+    blurred::{BlurModel, Contest, Entrant, MOST_CELLS, MOST_TRIALS, Won},
+    lattice::Lattice,
+    map::SmoothMap,
+};
 
 /// How a lattice lies on the board.
 #[derive(Clone, Copy, Debug)]
@@ -73,6 +70,13 @@ const BITS_PER_VOTE: f64 = 2.0;
 const MIN_MARGIN: f64 = 12.0;
 /// Least significance: chance reaches 6 once in 10⁹, a few hundred placements are tried.
 const MIN_SIGNIFICANCE: f64 = 6.0;
+/// Least part of the lattice's nodes on the board where the picture is clear: a false one at its rim is all it has.
+const CLEAR_INSIDE: f64 = 0.9;
+/// The same where it is not: blur makes crossings of the ends of the outermost edges, a whole row of them. The true
+/// placement must be among those that are tried, or a false one wins unopposed.
+const BLURRED_INSIDE: f64 = 0.65;
+/// Correlation of the bits with the expectation that only a clear picture has.
+const CLEAR_CORRELATION: f64 = 0.7;
 /// A cell votes when its rim is brighter than the border of its marker by this fraction of the board's contrast.
 const MIN_CELL_CONTRAST: f64 = 0.2;
 
@@ -192,35 +196,33 @@ fn sample_order(size: usize, turn: [[i32; 2]; 2]) -> Vec<usize> {
     order
 }
 
-/// Shifts under which the lattice lies on the board. Should it be larger than the board (a false node at its rim),
-/// the shifts under which at most a tenth of its nodes lies outside.
-fn shifts(board: &CharucoBoard, lattice: &Lattice, turn: [[i32; 2]; 2]) -> Vec<[i32; 2]> {
+/// Shifts under which at least this part of the lattice's nodes lies on the board.
+fn shifts(
+    board: &CharucoBoard,
+    lattice: &Lattice,
+    turn: [[i32; 2]; 2],
+    least_inside: f64,
+) -> Vec<[i32; 2]> {
     let size = [board.squares_x as i32 - 1, board.squares_y as i32 - 1];
     let turned: Vec<[i32; 2]> =
         lattice.nodes.iter().map(|n| [0, 1].map(|a| turn[a][0] * n.i + turn[a][1] * n.j)).collect();
-    let range = |a: usize| {
-        let low = turned.iter().map(|t| t[a]).min().unwrap_or(0);
-        let high = turned.iter().map(|t| t[a]).max().unwrap_or(0);
-        (low, high)
+    let most_outside = ((1.0 - least_inside) * turned.len() as f64) as usize;
+    // Along each axis alone, few enough nodes are outside.
+    let span = |a: usize| {
+        let mut sorted: Vec<i32> = turned.iter().map(|t| t[a]).collect();
+        sorted.sort_unstable();
+        let (low, high) = (sorted[most_outside], sorted[sorted.len() - 1 - most_outside]);
+        let (first, last) = (-low, size[a] - 1 - high);
+        first.min(last)..=first.max(last)
     };
-    let ((x0, x1), (y0, y1)) = (range(0), range(1));
-    let fits = x1 - x0 < size[0] && y1 - y0 < size[1];
-    let span = |low: i32, high: i32, size: i32| {
-        let (a, b) = (-low, size - 1 - high);
-        a.min(b)..=a.max(b)
-    };
+    let (across, down) = (span(0), span(1));
     let mut shifts = Vec::new();
-    for sx in span(x0, x1, size[0]) {
-        for sy in span(y0, y1, size[1]) {
-            let outside = || {
-                turned
-                    .iter()
-                    .filter(|t| {
-                        !(0..size[0]).contains(&(t[0] + sx)) || !(0..size[1]).contains(&(t[1] + sy))
-                    })
-                    .count()
+    for sx in across {
+        for sy in down.clone() {
+            let outside = |t: &&[i32; 2]| {
+                !(0..size[0]).contains(&(t[0] + sx)) || !(0..size[1]).contains(&(t[1] + sy))
             };
-            if fits || outside() * 10 <= turned.len() {
+            if turned.iter().filter(outside).count() <= most_outside {
                 shifts.push([sx, sy]);
             }
         }
@@ -237,7 +239,6 @@ pub(super) struct Expected {
     markers: Vec<Vec<Option<usize>>>,
     /// ±1 for every sample of every marker used, border included.
     codes: Vec<f32>,
-    n_used: usize,
     /// Samples along one side of a marker, border included.
     size: usize,
     /// Made when the first blurred picture needs it.
@@ -281,7 +282,7 @@ impl Expected {
                 }
             }
         }
-        Self { board: board.clone(), layouts, markers, codes, n_used, size, blur: OnceLock::new() }
+        Self { board: board.clone(), layouts, markers, codes, size, blur: OnceLock::new() }
     }
 
     /// Lays the lattice onto the board by the soft bits of its cells: quick, and enough unless motion smears them.
@@ -293,8 +294,22 @@ impl Expected {
     ) -> Result<Placement, NotIdentified> {
         let cells = cells(&self.board, image, lattice, map, true);
         // A mirrored placement is far from every other: it is tried only where no straight one convinces.
-        self.best_by_bits(lattice, &cells, 0..4)
-            .or_else(|_| self.best_by_bits(lattice, &cells, 0..8))
+        self.best_by_bits(lattice, &cells, 0..4, CLEAR_INSIDE)
+            .and_then(|(placement, correlation)| {
+                (correlation > CLEAR_CORRELATION)
+                    .then_some(placement)
+                    .ok_or(NotIdentified::Ambiguous)
+            })
+            .or_else(|_| self.by_blurred_bits(lattice, &cells))
+    }
+
+    /// The same, with every placement allowed that is not absurd.
+    fn by_blurred_bits(
+        &self,
+        lattice: &Lattice,
+        cells: &[Cell],
+    ) -> Result<Placement, NotIdentified> {
+        self.best_by_bits(lattice, cells, 0..8, BLURRED_INSIDE).map(|(placement, _)| placement)
     }
 
     /// Lays the lattice onto the board where [`by_bits`](Self::by_bits) failed: under an unknown blur, then as a
@@ -307,9 +322,9 @@ impl Expected {
     ) -> Result<Placement, NotIdentified> {
         let bright = cells(&self.board, image, lattice, map, true);
         let dark = || cells(&self.board, image, lattice, map, false);
-        self.best_by_bits(lattice, &bright, 0..8).or_else(|why| {
+        self.by_blurred_bits(lattice, &bright).or_else(|why| {
             self.best_by_blur(lattice, &bright)
-                .or_else(|_| self.best_by_bits(lattice, &dark(), 0..8))
+                .or_else(|_| self.by_blurred_bits(lattice, &dark()))
                 .map_err(|_| why)
         })
     }
@@ -329,11 +344,17 @@ impl Expected {
     }
 
     /// Every placement that the colours of the squares allow, with the number of its markers.
-    fn placements(&self, lattice: &Lattice, cells: &[Cell], turns: Range<usize>) -> Vec<Candidate> {
+    fn placements(
+        &self,
+        lattice: &Lattice,
+        cells: &[Cell],
+        turns: Range<usize>,
+        least_inside: f64,
+    ) -> Vec<Candidate> {
         let mut all = Vec::new();
         for turn in turns {
             let matrix = TURNS[turn];
-            for shift in shifts(&self.board, lattice, matrix) {
+            for shift in shifts(&self.board, lattice, matrix, least_inside) {
                 for &layout in self.layouts {
                     let mut place = Placement {
                         turn: matrix,
@@ -391,13 +412,14 @@ impl Expected {
         })
     }
 
-    /// The placement whose markers the soft bits agree with.
+    /// The placement whose markers the soft bits agree with, and their correlation.
     fn best_by_bits(
         &self,
         lattice: &Lattice,
         cells: &[Cell],
         turns: Range<usize>,
-    ) -> Result<Placement, NotIdentified> {
+        least_inside: f64,
+    ) -> Result<(Placement, f64), NotIdentified> {
         if cells.is_empty() {
             return Err(NotIdentified::NoMarkers);
         }
@@ -413,16 +435,12 @@ impl Expected {
             let (middle, half) = ((cell.rim + cell.border) / 2.0, (cell.rim - cell.border) / 2.0);
             ((cell.samples[k] - middle) / half).clamp(-1.5, 1.5)
         });
-        let mut candidates = self.placements(lattice, cells, turns);
+        let mut candidates = self.placements(lattice, cells, turns, least_inside);
         for candidate in &mut candidates {
             let mut score = 0.0_f32;
             for (cell, bits) in cells.iter().zip(values[candidate.turn].chunks_exact(n2)) {
                 if let Some(Some(id)) = self.marker(&candidate.place, cell) {
-                    score += bits
-                        .iter()
-                        .zip(&self.codes[id * n2..][..n2])
-                        .map(|(v, c)| v * c)
-                        .sum::<f32>();
+                    score += dot(bits, &self.codes[id * n2..][..n2]);
                 }
             }
             candidate.score = f64::from(score);
@@ -434,9 +452,10 @@ impl Expected {
         let gain = best.score / n_bits.max(1.0);
         // The floor keeps a perfect picture from claiming certainty beyond its few bits.
         let variance = (energy - gain * gain).max(0.1);
-        let significance = gain / energy.sqrt().max(1e-6) * (n_bits / BITS_PER_VOTE).sqrt();
+        let correlation = gain / energy.sqrt().max(1e-6);
+        let significance = correlation * (n_bits / BITS_PER_VOTE).sqrt();
         let margin = gain / variance * (best.score - second.max(0.0)) / BITS_PER_VOTE;
-        accept(Placement { margin, significance, ..best.place })
+        Ok((accept(Placement { margin, significance, ..best.place })?, correlation))
     }
 
     /// The placement that, under a blur of its own, leaves the least of the picture unexplained.
@@ -446,59 +465,41 @@ impl Expected {
         }
         // The work grows with placements times cells: a sample of the cells does, and a small part of a huge board is
         // left alone.
-        let step = cells.len().div_ceil(MOST_BLURRED_CELLS);
+        let step = cells.len().div_ceil(MOST_CELLS);
         let cells: Vec<Cell> = cells.iter().step_by(step).cloned().collect();
-        let mut candidates = self.placements(lattice, &cells, 0..8);
-        if candidates.len() * cells.len() > MOST_BLURRED_TRIALS {
+        let candidates = self.placements(lattice, &cells, 0..8, BLURRED_INSIDE);
+        if candidates.len() * cells.len() > MOST_TRIALS {
             return Err(NotIdentified::Ambiguous);
         }
-        let n2 = self.size * self.size;
         let half = lattice.contrast as f32 / 2.0;
         let values = self.turned(&cells, 0..8, |cell, k| (cell.samples[k] - cell.rim) / half + 1.0);
-        let blur = self.blur.get_or_init(|| BlurModel::new(self));
-        // Every pair of a cell and a marker is met by many placements: correlate it once.
-        let mut memo: Vec<Option<Box<[f64; TAPS]>>> =
-            vec![None; TURNS.len() * cells.len() * self.n_used];
-        let most = candidates.iter().map(|c| c.place.n_markers).max().unwrap_or(0);
-        for candidate in &mut candidates {
-            // Residuals are comparable only over the same cells.
-            if candidate.place.n_markers < most {
-                candidate.score = f64::NEG_INFINITY;
-                continue;
-            }
-            let mut fit = BlurFit::default();
-            for (c, cell) in cells.iter().enumerate() {
-                let Some(Some(id)) = self.marker(&candidate.place, cell) else { continue };
-                let samples = &values[candidate.turn][c * n2..][..n2];
-                let key = (candidate.turn * cells.len() + c) * self.n_used + id;
-                let part = memo[key].get_or_insert_with(|| Box::new(blur.correlate(id, samples)));
-                fit.add(&blur.normals[id], part, samples);
-            }
-            candidate.score = fit.score();
-        }
-        let (best, second) = best_two(&candidates).ok_or(NotIdentified::Ambiguous)?;
-        // What all markers have in common explains much of any of them. The best must beat that, too.
-        let common = {
-            let id = self.n_used;
-            let mut fit = BlurFit::default();
-            for (c, cell) in cells.iter().enumerate() {
-                if let Some(Some(_)) = self.marker(&best.place, cell) {
-                    let samples = &values[best.turn][c * n2..][..n2];
-                    fit.add(&blur.normals[id], &blur.correlate(id, samples), samples);
-                }
-            }
-            fit.score()
-        };
-        let lead = best.score - second.max(common);
-        let votes = (best.place.n_markers * n2) as f64 / (2.0 * SAMPLES_PER_VOTE);
-        let margin = votes * lead;
-        if lead < MIN_BLUR_LEAD {
-            return Err(NotIdentified::Ambiguous);
-        }
-        // The margin over what is common plays the part of the significance.
-        let significance = (2.0 * votes * (best.score - common)).max(0.0).sqrt();
-        accept(Placement { margin, significance, ..best.place })
+        let entrants: Vec<Entrant> = candidates
+            .iter()
+            .map(|candidate| {
+                let marker = |cell| self.marker(&candidate.place, cell).flatten();
+                Entrant::new(candidate.turn, cells.iter().map(marker).collect())
+            })
+            .collect();
+        let model = self.blur.get_or_init(|| BlurModel::new(self.size, &self.codes));
+        let won = Contest::new(model, &values, cells.len(), &entrants)
+            .winner()
+            .ok_or(NotIdentified::Ambiguous)?;
+        let Won { index, margin, significance } = won;
+        accept(Placement { margin, significance, ..candidates[index].place })
     }
+}
+
+/// Σ a·b in eight sums, which the compiler makes vectors of.
+fn dot(a: &[f32], b: &[f32]) -> f32 {
+    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<8>(), b.as_chunks::<8>());
+    let mut sums = [0.0_f32; 8];
+    for (a, b) in a.iter().zip(b) {
+        for k in 0..8 {
+            sums[k] += a[k] * b[k];
+        }
+    }
+    let rest: f32 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
+    sums.iter().sum::<f32>() + rest
 }
 
 /// The best candidate and the score of the runner-up.
@@ -525,151 +526,5 @@ fn accept(placement: Placement) -> Result<Placement, NotIdentified> {
         Ok(placement)
     } else {
         Err(NotIdentified::Ambiguous)
-    }
-}
-
-/// Reach of the blur's kernel, bits to each side.
-const REACH: i32 = 3;
-/// Unknowns of the blur: its kernel and a constant.
-const TAPS: usize = 50;
-/// Cells that a blurred reading takes in at most.
-const MOST_BLURRED_CELLS: usize = 64;
-/// Pairs of a placement and a cell at most: about a tenth of a second.
-const MOST_BLURRED_TRIALS: usize = 60_000;
-/// Blurred samples are far from independent: this many count as one.
-const SAMPLES_PER_VOTE: f64 = 4.0;
-
-/// Least ln(RSS of the runner-up / RSS of the best): chance and model errors stay below 0.05, blurred boards that a
-/// person can read lie above 0.2.
-const MIN_BLUR_LEAD: f64 = 0.12;
-
-/// Entries of the lower triangle of a normal matrix, row by row.
-const TRIANGLE: usize = TAPS * (TAPS + 1) / 2;
-
-/// A normal matrix of markers: its entries are sums of products of ±1, exact in 32 bits.
-type Normal = [f32; TRIANGLE];
-
-/// The kernel that explains all samples added.
-struct BlurFit {
-    normal: Box<Normal>,
-    right: [f64; TAPS],
-    energy: f64,
-    n_samples: f64,
-}
-
-impl Default for BlurFit {
-    fn default() -> Self {
-        Self { normal: Box::new([0.0; TRIANGLE]), right: [0.0; TAPS], energy: 0.0, n_samples: 0.0 }
-    }
-}
-
-impl BlurFit {
-    fn add(&mut self, normal: &Normal, right: &[f64; TAPS], samples: &[f32]) {
-        for (sum, part) in self.normal.iter_mut().zip(normal) {
-            *sum += part;
-        }
-        for (sum, part) in self.right.iter_mut().zip(right) {
-            *sum += part;
-        }
-        self.energy += samples.iter().map(|v| f64::from(v * v)).sum::<f64>();
-        self.n_samples += samples.len() as f64;
-    }
-
-    /// −ln of the mean squared residual.
-    fn score(self) -> f64 {
-        let mut normal = nalgebra::SMatrix::<f64, TAPS, TAPS>::zeros();
-        let mut entries = self.normal.iter();
-        for i in 0..TAPS {
-            for (j, entry) in (0..=i).zip(&mut entries) {
-                normal[(i, j)] = f64::from(*entry);
-            }
-            normal[(i, i)] += 1e-3 * self.n_samples;
-        }
-        // The lower triangle is all that the decomposition reads: L y = b, and the explained energy is |y|².
-        let Some(cholesky) = normal.cholesky() else { return f64::NEG_INFINITY };
-        let right = nalgebra::SVector::<f64, TAPS>::from(self.right);
-        let Some(y) = cholesky.l_dirty().solve_lower_triangular(&right) else {
-            return f64::NEG_INFINITY;
-        };
-        let explained = y.norm_squared();
-        let residual = (self.energy - explained).max(1e-6 * self.energy);
-        -(residual / self.n_samples).ln()
-    }
-}
-
-/// Adds the outer product of the taps with themselves.
-fn add_products(normal: &mut Normal, taps: &[f32; TAPS]) {
-    let mut entries = normal.iter_mut();
-    for i in 0..TAPS {
-        for (tap, entry) in taps[..=i].iter().zip(&mut entries) {
-            *entry += taps[i] * tap;
-        }
-    }
-}
-
-/// The expected markers, and last the mean of all, shifted by every tap of the kernel.
-#[derive(Clone, Debug)]
-struct BlurModel {
-    /// For each marker, sample and tap: the expected value.
-    shifted: Vec<f32>,
-    /// For each marker the normal matrix of its samples.
-    normals: Vec<Normal>,
-    n2: usize,
-}
-
-impl BlurModel {
-    fn new(expected: &Expected) -> Self {
-        let (size, n2) = (expected.size as i32, expected.size * expected.size);
-        let mut shifted = Vec::with_capacity(expected.n_used * n2 * TAPS);
-        let mut normals = Vec::with_capacity(expected.n_used);
-        for id in 0..expected.n_used {
-            let mut normal = [0.0; TRIANGLE];
-            for row in 0..size {
-                for column in 0..size {
-                    let mut taps = [1.0_f32; TAPS];
-                    let offsets =
-                        (-REACH..=REACH).flat_map(|dy| (-REACH..=REACH).map(move |dx| (dx, dy)));
-                    for (tap, (dx, dy)) in taps.iter_mut().zip(offsets) {
-                        let (r, c) = (row + dy, column + dx);
-                        // Round the marker lies the white rim of its square.
-                        *tap = if (0..size).contains(&r) && (0..size).contains(&c) {
-                            expected.codes[id * n2 + (r * size + c) as usize]
-                        } else {
-                            1.0
-                        };
-                    }
-                    add_products(&mut normal, &taps);
-                    shifted.extend(taps);
-                }
-            }
-            normals.push(normal);
-        }
-        // The mean marker.
-        let mut normal = [0.0; TRIANGLE];
-        for sample in 0..n2 {
-            let mut mean = [0.0_f32; TAPS];
-            for id in 0..expected.n_used {
-                let row = &shifted[(id * n2 + sample) * TAPS..][..TAPS];
-                for (m, t) in mean.iter_mut().zip(row) {
-                    *m += t / expected.n_used as f32;
-                }
-            }
-            add_products(&mut normal, &mean);
-            shifted.extend(mean);
-        }
-        normals.push(normal);
-        Self { shifted, normals, n2 }
-    }
-
-    /// Σ over the samples of value · expected, for each tap.
-    fn correlate(&self, id: usize, samples: &[f32]) -> [f64; TAPS] {
-        let mut sums = [0.0_f32; TAPS];
-        let rows = self.shifted[id * self.n2 * TAPS..][..self.n2 * TAPS].chunks_exact(TAPS);
-        for (v, row) in samples.iter().zip(rows) {
-            for (sum, t) in sums.iter_mut().zip(row) {
-                *sum += v * t;
-            }
-        }
-        sums.map(f64::from)
     }
 }

@@ -23,6 +23,7 @@
 //!
 //! Not here: camera models and poses. Nothing below knows a focal length.
 
+mod blurred;
 mod detector;
 mod identify;
 mod lattice;
