@@ -46,7 +46,7 @@ struct Memory {
 const MOST_SADDLES_PER_MPX: f64 = 12_000.0;
 const LEAST_MOST_SADDLES: usize = 600;
 /// Nodes that make a lattice worth reading: two cells.
-const MIN_NODES: usize = 6;
+pub(super) const MIN_NODES: usize = 6;
 /// Lattices tried on one level, largest first.
 const MOST_LATTICES: usize = 4;
 /// The shorter side of the coarsest level tried, pixels.
@@ -100,9 +100,7 @@ impl Detector {
         memory: &mut saddle::Memory,
         rejects: &mut Vec<Reject>,
     ) -> Option<Found> {
-        let mpx = (level.width * level.height) as f64 * 1e-6;
-        let most = ((MOST_SADDLES_PER_MPX * mpx) as usize).max(LEAST_MOST_SADDLES);
-        let saddles = saddles(level, most, memory);
+        let saddles = saddles(level, most_saddles(level), memory);
         let mut identified: Option<Found> = None;
         for mut lattice in lattices(level, &saddles, MIN_NODES).into_iter().take(MOST_LATTICES) {
             if identified.is_some() {
@@ -282,9 +280,15 @@ struct Found {
     placement: Placement,
 }
 
+/// How many saddles of a level are kept.
+pub(super) fn most_saddles(level: &Level) -> usize {
+    let mpx = (level.width * level.height) as f64 * 1e-6;
+    ((MOST_SADDLES_PER_MPX * mpx) as usize).max(LEAST_MOST_SADDLES)
+}
+
 /// Blocks to try, best guess first: squares of 12 to 150 pixels are seen at half resolution, smaller ones at full,
 /// larger ones on a coarser level.
-fn factors(image: &Gray) -> Vec<usize> {
+pub(super) fn factors(image: &Gray) -> Vec<usize> {
     let size = image.width().min(image.height());
     let mut factors = vec![2, 1, 3];
     let mut factor = 4;

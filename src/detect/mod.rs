@@ -4,9 +4,13 @@
 //!
 //! 1. `saddle`: crossings of two edges in a smoothed image;
 //! 2. `lattice`: who is whose neighbour, along the edges;
-//! 3. `identify`: which part of the board it is, by the joint vote of all visible markers, accepted only with a clear
-//!    lead over the runner-up;
+//! 3. `identify` and, where motion smears the markers, `blurred`: which part of the board it is, by the joint vote of
+//!    all visible markers, accepted only with a clear lead over the runner-up;
 //! 4. `refine`: every corner the board should show, to sub-pixel, with its standard deviation.
+//!
+//! `docs/method/detect.md` has the equations, pictures of each step (made by [`Detector::trace`]), and what was
+//! measured. The cost is one pass over the pixels at half resolution and about 3 µs per corner: half a millisecond for
+//! a sharp picture of 640 × 480 pixels. Coarser and finer levels are tried only where no board is found.
 //!
 //! An [`Observation`] holds what was found *and* what was not taken, with the reason. The detector may miss a corner;
 //! it does not invent one: later steps drop, they never relabel.
@@ -32,8 +36,10 @@ mod pyramid;
 mod refine;
 mod saddle;
 mod simd;
+mod trace;
 
 pub use detector::Detector;
+pub use trace::Trace;
 
 use crate::{board::Layout, geom::Pixel};
 

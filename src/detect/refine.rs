@@ -221,8 +221,8 @@ fn iterate(
 const NO_BLUR: f64 = (SHARP_REACH - CLEAN_REACH) / BLUR_WIDTHS;
 
 /// Width of the blur across the edge along `edge`, pixels: how far it takes the grey values to go from 15 % to 85 % of
-/// the step, over 0.7, on the better of the edge's two halves. The first half that is sharp enough to need no widening is enough. `across` is the distance that one of `other` spans at
-/// right angles to the edge. 0 where no edge is seen.
+/// the step, over 0.7, on the better of the edge's two halves; the first half that is sharp enough to need no widening
+/// is enough. `across` is the distance that one of `other` spans at right angles to the edge. 0 where no edge is seen.
 fn blur_width(image: &Gray, guess: &Guess, edge: [f64; 2], other: [f64; 2], across: f64) -> f64 {
     const STEPS: usize = 12;
     const MOST_PX: f64 = 18.0;

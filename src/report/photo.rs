@@ -57,7 +57,7 @@ impl Photo {
     }
 
     /// The JPEG as a `data:` address.
-    pub(super) fn data_uri(&self) -> String {
+    pub fn data_uri(&self) -> String {
         format!("data:image/jpeg;base64,{}", base64(&self.jpeg))
     }
 }

@@ -236,7 +236,12 @@ fn table(images: &[DetectedImage]) -> String {
     for image in images {
         let path = &image.path;
         let found = match &image.layout {
-            Some(layout) => format!("{:>4} corners  {layout}", image.corners.len()),
+            Some(layout) => {
+                let identity = image.identity.as_ref();
+                let mirrored = if identity.is_some_and(|i| i.mirrored) { " mirrored" } else { "" };
+                let inverted = if identity.is_some_and(|i| i.inverted) { " inverted" } else { "" };
+                format!("{:>4} corners  {layout}{mirrored}{inverted}", image.corners.len())
+            }
             None => "   no board".to_owned(),
         };
         text.push_str(&format!("{path:width$}  {found:<21}"));

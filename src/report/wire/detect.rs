@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::finite;
-use crate::detect::{Corner, Observation, Reject};
+use crate::detect::{Corner, Identity, Observation, Reject};
 
 /// Corners of images.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -25,6 +25,9 @@ pub struct DetectedImage {
     pub board_found: bool,
     /// `legacy` or `new`, where a board was found.
     pub layout: Option<String>,
+    /// How the board was told from all others; only where one was found.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub identity: Option<DetectedIdentity>,
     /// By ascending id.
     pub corners: Vec<DetectedCorner>,
     /// Candidates that were not taken.
@@ -47,11 +50,32 @@ impl DetectedImage {
             height,
             board_found: observation.identity.is_some(),
             layout: observation.identity.as_ref().map(|identity| identity.layout.name().to_owned()),
+            identity: observation.identity.as_ref().map(DetectedIdentity::from),
             corners: observation.corners.iter().map(DetectedCorner::from).collect(),
             rejected: observation.rejects.iter().map(RejectedCorner::from).collect(),
             decode_ms: None,
             detect_ms: None,
         }
+    }
+}
+
+/// How a board was told from all others.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DetectedIdentity {
+    /// The image shows the board mirrored; ids are still those of the board.
+    pub mirrored: bool,
+    /// Black and white are exchanged on the print.
+    pub inverted: bool,
+    /// Markers that voted.
+    pub n_markers: usize,
+    /// Lead over the runner-up placement, as a log-likelihood ratio in nats.
+    pub margin_nats: Option<f64>,
+}
+
+impl From<&Identity> for DetectedIdentity {
+    fn from(identity: &Identity) -> Self {
+        let Identity { mirrored, inverted, n_markers, margin, .. } = *identity;
+        Self { mirrored, inverted, n_markers, margin_nats: finite(margin) }
     }
 }
 

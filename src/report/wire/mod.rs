@@ -25,7 +25,7 @@ pub use audit::{
 pub use calibration::{
     Calibration, Candidate, Distortion, DistortionTest, Hypothesis, Outlier, Parameter, Table, View,
 };
-pub use detect::{Detect, DetectedCorner, DetectedImage, RejectedCorner};
+pub use detect::{Detect, DetectedCorner, DetectedIdentity, DetectedImage, RejectedCorner};
 
 use serde::{Deserialize, Serialize};
 
