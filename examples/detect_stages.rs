@@ -10,7 +10,7 @@ use truedepth::{
     detect::{Corner, Detector, Trace},
     geom::{Pose, Rotation, Vector3},
     image::{Gray, Rgb},
-    report::Photo,
+    report::{Photo, PhotoSize},
     simulate::{Motion, Noise, Scene, render},
 };
 
@@ -51,7 +51,8 @@ fn picture(board: &CharucoBoard) -> Gray {
 /// An SVG of the image's size: a picture, and shapes over it.
 fn svg(background: &Gray, shapes: &str) -> String {
     let gray = background.pixels().iter().map(|&v| [v; 3]).collect();
-    let photo = Photo::new(0, &Rgb::new(background.width(), background.height(), gray));
+    let photo =
+        Photo::new(0, &Rgb::new(background.width(), background.height(), gray), PhotoSize::Large);
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" font-family=\"sans-serif\">\n\
          <image width=\"{WIDTH}\" height=\"{HEIGHT}\" preserveAspectRatio=\"none\" href=\"{}\"/>\n{shapes}</svg>\n",
