@@ -269,8 +269,9 @@ pub(crate) struct AuditArgs {
 
     /// What still counts as true, like focal=0.5%; may be given several times
     ///
-    /// A significant deviation beyond it is a fault. One of focal=1%, depth-scale=1%, depth-bias=3mm and
-    /// distortion=1px (at the corner of the image); these values are the defaults.
+    /// A significant deviation beyond it is a fault. One of focal=1%, principal-point=2px, depth-scale=1%,
+    /// depth-bias=3mm, distortion=1px (at the corner of the image), zoom=1% and shift=1px (of depth against colour); these
+    /// values are the defaults.
     #[arg(long = "tolerance", value_name = "NAME=VALUE", value_parser = tolerance)]
     pub(crate) tolerances: Vec<Tolerance>,
 
@@ -306,10 +307,14 @@ pub(crate) enum Tolerance {
     DepthScale(f64),
     DepthBiasM(f64),
     DistortionPx(f64),
+    PrincipalPointPx(f64),
+    Zoom(f64),
+    ShiftPx(f64),
 }
 
 fn tolerance(text: &str) -> Result<Tolerance, String> {
-    const FORMS: &str = "focal=1%, depth-scale=1%, depth-bias=3mm or distortion=1px";
+    const FORMS: &str = "focal=1%, principal-point=2px, depth-scale=1%, depth-bias=3mm, distortion=1px, zoom=1% \
+                         or shift=1px";
     let wrong = || format!("write {FORMS}");
     let (name, value) = text.split_once('=').ok_or_else(wrong)?;
     let number = |unit: &str| -> Result<f64, String> {
@@ -325,6 +330,9 @@ fn tolerance(text: &str) -> Result<Tolerance, String> {
             _ => Err(wrong()),
         },
         "distortion" => Ok(Tolerance::DistortionPx(number("px")?)),
+        "principal-point" => Ok(Tolerance::PrincipalPointPx(number("px")?)),
+        "zoom" => Ok(Tolerance::Zoom(number("%")? / 100.0)),
+        "shift" => Ok(Tolerance::ShiftPx(number("px")?)),
         _ => Err(wrong()),
     }
 }
@@ -643,6 +651,8 @@ mod tests {
         assert_eq!(tolerance("focal=0.5%"), Ok(Tolerance::Focal(0.005)));
         assert_eq!(tolerance("depth-bias=2mm"), Ok(Tolerance::DepthBiasM(0.002)));
         assert_eq!(tolerance("distortion=0.5px"), Ok(Tolerance::DistortionPx(0.5)));
+        assert_eq!(tolerance("zoom=2%"), Ok(Tolerance::Zoom(0.02)));
+        assert_eq!(tolerance("shift=0.5px"), Ok(Tolerance::ShiftPx(0.5)));
         for text in
             ["focal", "focal=1", "focal=-1%", "focal=nan%", "depth-bias=3", "vocal=1%", "focal=1px"]
         {

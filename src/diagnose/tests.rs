@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     board::{CharucoBoard, Layout},
-    calibrate::{FrameCorners, Input, distortion_test},
+    calibrate::{FrameCorners, Input, Method, Model, calibrate, distortion_test},
     camera::{Camera, Distortion, Intrinsics, RadialTable, TablePair},
     depth::{
         BoardDepth, CornerDepth, DepthSteps, Patch, Patches, RegisterInput, against_board,
@@ -64,6 +64,8 @@ struct World {
     factory: Factory,
     /// Taken as exact.
     own: Option<Camera>,
+    /// A calibration from these corners, with residuals of this size.
+    calibrated_rms_px: Option<f64>,
     problems: Vec<Problem>,
 }
 
@@ -84,6 +86,7 @@ impl World {
             steps: DepthSteps { n_levels: 1400, step_share: 0.0003 },
             range_m: [0.2, 0.45],
             mirrored: false,
+            calibrated_rms_px: None,
             factory,
             problems: Vec::new(),
         }
@@ -203,6 +206,13 @@ impl World {
             let factory = &self.factory.intrinsics;
             distortion_test(&Input { board: &BOARD, factory, tables, frames: &frames })
         });
+        let calibration = self.calibrated_rms_px.map(|rms_px| {
+            let factory = &self.factory.intrinsics;
+            let input = Input { board: &BOARD, factory, tables: None, frames: &frames };
+            let mut found = calibrate(&input, Method::Robust(Model::Focal)).unwrap();
+            found.rms_px = rms_px;
+            found
+        });
         diagnose(&Case {
             problems: &self.problems,
             n_frames: observations.len(),
@@ -210,7 +220,7 @@ impl World {
             factory: Some(&self.factory),
             board: &BOARD,
             observations: &observations.iter().collect::<Vec<_>>(),
-            calibration: None,
+            calibration: calibration.as_ref(),
             no_calibration: None,
             camera: self.own.as_ref(),
             factory_views: &factory_views.iter().collect::<Vec<_>>(),
@@ -461,4 +471,23 @@ fn two_recordings() {
     assert_eq!(change(1781.78), Verdict::Ok);
     assert_eq!(change(1780.13), Verdict::Info); // iOS 15 on the 12.9-inch 5th generation
     assert_eq!(change(1916.17), Verdict::Warning);
+}
+
+/// A board of another layout than was taken for granted leaves 4.8 px, and focal lengths that are wrong by percents.
+#[test]
+fn no_verdict_from_a_calibration_that_does_not_fit() {
+    let mut world = World::true_one();
+    world.factory.intrinsics = pinhole(596.0 * 1.06);
+    world.zoom = 0.9507;
+    world.calibrated_rms_px = Some(0.2);
+    assert_eq!(world.faults(), [Code::TD201, Code::TD401]);
+    world.calibrated_rms_px = Some(4.8);
+    assert_eq!(world.faults(), []);
+    let (findings, state) = world.judge();
+    assert_eq!(state, DistortionState::Unknown);
+    for code in [Code::TD201, Code::TD202, Code::TD203, Code::TD204, Code::TD301, Code::TD401] {
+        let finding = findings.iter().find(|f| f.code == code).unwrap();
+        assert_eq!(finding.verdict, Verdict::Unknown, "{finding:?}");
+        assert!(finding.summary.contains("4.80 px") && !finding.what_to_do.is_empty());
+    }
 }

@@ -68,6 +68,9 @@ fn options(args: &AuditArgs) -> Result<Options, Failure> {
             Tolerance::DepthScale(fraction) => options.tolerances.depth_scale = fraction,
             Tolerance::DepthBiasM(bias_m) => options.tolerances.depth_bias_m = bias_m,
             Tolerance::DistortionPx(px) => options.tolerances.distortion_px = px,
+            Tolerance::PrincipalPointPx(px) => options.tolerances.principal_point_px = px,
+            Tolerance::Zoom(fraction) => options.tolerances.zoom = fraction,
+            Tolerance::ShiftPx(px) => options.tolerances.shift_px = px,
         }
     }
     Ok(options)
