@@ -270,8 +270,8 @@ pub(crate) struct AuditArgs {
     /// What still counts as true, like focal=0.5%; may be given several times
     ///
     /// A significant deviation beyond it is a fault. One of focal=1%, principal-point=2px, depth-scale=1%,
-    /// depth-bias=3mm, distortion=1px (at the corner of the image), zoom=1% and shift=1px (of depth against colour); these
-    /// values are the defaults.
+    /// depth-bias=3mm, distortion=1px (at the corner of the image), zoom=1% and shift=1px (of depth against colour);
+    /// these values are the defaults.
     #[arg(long = "tolerance", value_name = "NAME=VALUE", value_parser = tolerance)]
     pub(crate) tolerances: Vec<Tolerance>,
 
