@@ -9,12 +9,14 @@
 //! ([`truedepth::simulate::Plan::glimpse`]); `--rendered N` renders the first N of them as pictures, too, and detects
 //! the board in these.
 
+#![allow(clippy::print_stdout, reason = "the study's outcome goes there")]
+
 use std::sync::Arc;
 
 use rayon::prelude::{IntoParallelIterator, ParallelIterator};
 use truedepth::{
     audit::{Audit, Method, Options, Seen, audit, audit_seen},
-    calibrate::Estimate,
+    calibrate::{Estimate, Lens},
     diagnose::{Code, Finding, Verdict},
     recording::{Limits, Memory, Recording},
     simulate::{Device, Faults, Plan, Stream},
@@ -67,12 +69,17 @@ fn errors(plan: &Plan, audit: &Audit) -> Vec<(&'static str, f64, f64)> {
     if let Some(calibration) = &audit.calibration {
         let relative = |e: Estimate, by: f64| Estimate { value: e.value / by, sigma: e.sigma / by };
         add("focal, relative", relative(calibration.focal_px(), camera.fx), 1.0);
-        if let Some(x) = calibration.parameter("center_x_px") {
-            add("centre x, px", x, camera.cx);
-        }
-        if let Some(y) = calibration.parameter("center_y_px") {
-            add("centre y, px", y, camera.cy);
-        }
+    }
+    // The principal point is not free in the model that is mostly chosen, but it is in the test of the distortion.
+    let lens = match (plan.stream(), factory_has_tables(plan)) {
+        (Stream::Rectified, _) => Lens::None,
+        (_, true) => Lens::InverseTable,
+        (_, false) => Lens::FreeRadial,
+    };
+    let test = audit.distortion.as_ref();
+    if let Some(h) = test.and_then(|t| t.hypotheses.iter().find(|h| h.lens == lens)) {
+        add("centre x, px", h.center_px[0], camera.cx);
+        add("centre y, px", h.center_px[1], camera.cy);
     }
     if let Some(found) = &audit.registration {
         add("depth scale", found.scale, 1.0 + truth.depth.scale_excess);
@@ -82,6 +89,10 @@ fn errors(plan: &Plan, audit: &Audit) -> Vec<(&'static str, f64, f64)> {
         add("shift y, px", found.shift_px[1], truth.depth.shift_px[1]);
     }
     errors
+}
+
+fn factory_has_tables(plan: &Plan) -> bool {
+    plan.factory().tables.is_some()
 }
 
 fn table(title: &str, plans: &[Plan], audits: &[Audit]) {

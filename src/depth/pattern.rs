@@ -103,7 +103,7 @@ impl Pattern {
         for frame in residuals.chunk_by(|a, b| a.frame == b.frame) {
             let mut of_frame: Vec<(usize, f64)> =
                 frame.iter().map(|r| (cell(r), r.residual_m)).collect();
-            of_frame.sort_by(|a, b| a.0.cmp(&b.0));
+            of_frame.sort_by_key(|(cell, _)| *cell);
             for chunk in of_frame.chunk_by(|a, b| a.0 == b.0) {
                 let values: Vec<f64> = chunk.iter().map(|(_, r)| *r).collect();
                 medians[chunk[0].0].push(median(&values));
