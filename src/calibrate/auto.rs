@@ -1,16 +1,18 @@
 //! The best of several models, by how well they predict pictures that took no part.
 
 use super::{
-    Candidate, Error, Estimate, Input, Model, Outlier, RejectedFrame,
-    fit::{Data, Fit, fit},
-    model::{Center, Shape, Warp},
+    Candidate, Error, Estimate, Input, Model, Outlier, RejectedFrame, SurfaceCandidate,
+    fit::{Data, Fit, Start, Wanted, fit},
+    model::{Aspect, Center, Shape, Warp},
     problem::Measured,
-    surface::{Surface, lifted, prior_sigma_m},
+    surface::{Form, Sheet, Surface},
     views::{self, MIN_CORNERS, all_usable},
     weigh::{drop_outliers, weigh},
 };
 use crate::{
     camera::{Camera, Distortion},
+    detect::Corner,
+    geom::{Board, Color, Pose, Vector3},
     pose::Weighting,
     solve::{Loss, mean, standard_error},
 };
@@ -33,10 +35,13 @@ pub(super) struct Prepared {
     pub(super) outliers: Vec<Outlier>,
     pub(super) rejected: Vec<RejectedFrame>,
     pub(super) pictures: Vec<usize>,
-    /// Is the board's shape estimated with the camera?
+    pub(super) sheet: Sheet,
+    /// What is taken for known of the board's shape.
     pub(super) surface: Surface,
-    /// Its numbers as far as known, metres.
-    pub(super) surface_start_m: Vec<f64>,
+    /// Its numbers as far as known.
+    pub(super) form: Form,
+    /// All surfaces tried.
+    pub(super) surfaces: Vec<SurfaceCandidate>,
 }
 
 impl Prepared {
@@ -48,20 +53,23 @@ impl Prepared {
         self.pictures.iter().max().map_or(0, |last| last + 1)
     }
 
-    /// Turns the sum over held-out pictures into an RMS of 2-D distances, pixels.
-    pub(super) fn held_out_rms_px(&self, fit: &Fit) -> f64 {
+    /// The RMS of 2-D distances over held-out pictures, pixels; σ from the scatter between pictures.
+    pub(super) fn held_out_rms_px(&self, fit: &Fit) -> Estimate {
         let weights: f64 = self.views.iter().flat_map(|v| &v.weights).sum();
         let n = self.views.iter().map(|v| v.corners.len()).sum::<usize>() as f64;
         // Each pose took six residuals' worth from 2n.
         let degrees = 2.0 * n - 6.0 * self.views.len() as f64;
         let total: f64 = fit.held_out.iter().sum();
-        (total / weights * (2.0 * n / degrees)).sqrt()
+        let value = (total / weights * (2.0 * n / degrees)).sqrt();
+        // σ of a mean of squares, taken through the root.
+        let share = standard_error(&fit.held_out) / mean(&fit.held_out);
+        Estimate { value, sigma: 0.5 * value * share }
     }
 }
 
 /// Gathers all usable views; weighs their corners and finds outliers under a model that no lens of ours is far from
 /// (focal length, centre, k1, k2), so that what is left out does not depend on the model judged later; decides by
-/// held-out pictures (one-standard-error rule) whether the board is taken for flat.
+/// held-out pictures (one-standard-error rule) what the board's shape is taken to be.
 pub(super) fn prepare(input: &Input<'_>) -> Result<Prepared, Error> {
     let weighting = Weighting::Sigma { floor_px: 0.1 };
     let gathered = all_usable(input, MIN_CORNERS, weighting);
@@ -71,11 +79,13 @@ pub(super) fn prepare(input: &Input<'_>) -> Result<Prepared, Error> {
         outliers: Vec::new(),
         rejected: gathered.rejected,
         pictures: Vec::new(),
+        sheet: Sheet::new(input.board),
         surface: Surface::Flat,
-        surface_start_m: Vec::new(),
+        form: Form::default(),
+        surfaces: Vec::new(),
     };
     let pinhole = Camera { intrinsics: *input.factory, distortion: Distortion::None };
-    let first = residuals_px(&prepared.views, &pinhole, &[]);
+    let first = residuals_px(&prepared, &pinhole);
     weigh(&mut prepared.views, &first, 1.0);
     // Once with a loss that forgives gross errors, once with those gone.
     for loss in [Loss::Cauchy { scale: 3.0 }, LOSS] {
@@ -85,8 +95,8 @@ pub(super) fn prepare(input: &Input<'_>) -> Result<Prepared, Error> {
             view.pose = *pose;
         }
         prepared.surface = shape.surface;
-        prepared.surface_start_m = shape.surface_numbers(&fit.free).to_vec();
-        let residuals = residuals_px(&prepared.views, &camera, &prepared.surface_start_m);
+        prepared.form = fit.form(&shape);
+        let residuals = residuals_px(&prepared, &camera);
         let n_corners: usize = residuals.iter().map(Vec::len).sum();
         let taken = (fit.free.len() + 6 * residuals.len()) as f64;
         weigh(&mut prepared.views, &residuals, 1.0 - taken / (2 * n_corners) as f64);
@@ -108,7 +118,7 @@ pub(super) fn prepare(input: &Input<'_>) -> Result<Prepared, Error> {
     Ok(prepared)
 }
 
-/// The most flexible shape that the views determine, fitted.
+/// The most flexible camera that the views determine, with the surface that held-out pictures ask for, fitted.
 fn flexible<'a>(
     input: &Input<'_>,
     prepared: &mut Prepared,
@@ -120,7 +130,7 @@ fn flexible<'a>(
     }
     let mut closest: Option<Estimate> = None;
     let mut attempt = |center, warp, surface| {
-        let shape = Shape { center, warp, surface };
+        let shape = Shape { center, warp, aspect: Aspect::Fixed, surface };
         let fit = fit_with(input, prepared, shape, loss)?;
         let focal = fit.focal_px();
         if focal.sigma <= MAX_FOCAL_SIGMA * focal.value {
@@ -132,39 +142,66 @@ fn flexible<'a>(
     let flat = attempt(Center::Free, Warp::FreeRadial2, Surface::Flat)
         .or_else(|| attempt(Center::Free, Warp::None, Surface::Flat))
         .or_else(|| attempt(Center::Fixed, Warp::None, Surface::Flat));
-    let free =
-        flat.as_ref().and_then(|(shape, _)| attempt(shape.center, shape.warp, Surface::Free));
-    match (flat, free) {
-        (Some((_, flat)), Some((shape, free))) if behind_sigmas(&flat, &free) > 1.0 => {
-            Ok((shape, free))
+    let Some(flat) = flat else { return Err(underdetermined(prepared, closest)) };
+    let (center, warp) = (flat.0.center, flat.0.warp);
+    let mut tried = vec![flat];
+    for surface in [Surface::Bend, Surface::Free] {
+        if prepared.sheet.allows(surface) {
+            tried.extend(attempt(center, warp, surface));
         }
-        (Some(flat), _) => Ok(flat),
-        (None, _) => Err(underdetermined(prepared, closest)),
     }
+    let (chosen, behind) = simplest(&tried.iter().map(|(_, fit)| fit).collect::<Vec<_>>());
+    prepared.surfaces = tried
+        .iter()
+        .zip(behind)
+        .map(|((shape, fit), behind_best_sigmas)| SurfaceCandidate {
+            kind: shape.surface.kind(),
+            rms_px: shape_rms_px(input, prepared, *shape, fit),
+            held_out_rms_px: prepared.held_out_rms_px(fit).value,
+            held_out_sigma_px: prepared.held_out_rms_px(fit).sigma,
+            behind_best_sigmas,
+            focal_px: fit.focal_px(),
+        })
+        .collect();
+    Ok(tried.swap_remove(chosen))
 }
 
-/// Observed minus projected, on a board with these surface numbers (metres, none for flat); a corner that does not
-/// project is infinitely far off.
-pub(super) fn residuals_px(
-    views: &[Measured],
+/// The first of these fits, ordered from simple to flexible, that predicts held-out pictures within one standard error
+/// of the best; and by how many each lies behind.
+fn simplest(fits: &[&Fit]) -> (usize, Vec<f64>) {
+    let score = |fit: &Fit| mean(&fit.held_out);
+    let Some(best) = fits.iter().min_by(|a, b| score(a).total_cmp(&score(b))) else {
+        return (0, Vec::new());
+    };
+    let behind: Vec<f64> = fits.iter().map(|fit| behind_sigmas(fit, best)).collect();
+    (behind.iter().position(|b| *b <= 1.0).unwrap_or(0), behind)
+}
+
+/// Observed minus projected, on the board as it is known; a corner that does not project is infinitely far off.
+fn residuals_px(prepared: &Prepared, camera: &Camera) -> Vec<Vec<[f64; 2]>> {
+    let form = &prepared.form;
+    residuals(prepared, camera, (prepared.surface, form), prepared.views.iter().map(|v| v.pose))
+}
+
+/// The same with a surface and poses of its own.
+fn residuals(
+    prepared: &Prepared,
     camera: &Camera,
-    surface_m: &[f64],
+    (surface, form): (Surface, &Form),
+    poses: impl Iterator<Item = Pose<Color, Board>>,
 ) -> Vec<Vec<[f64; 2]>> {
-    views
-        .iter()
-        .map(|view| {
-            view.corners
-                .iter()
-                .zip(view.points.iter().zip(&view.modes))
-                .map(|(corner, (point, modes))| {
-                    match camera.project(view.pose * lifted(point, modes, surface_m)) {
-                        Some(pixel) => corner.pixel - pixel,
-                        None => [f64::INFINITY; 2],
-                    }
-                })
-                .collect()
-        })
-        .collect()
+    let of_view = |(view, pose): (&Measured, Pose<Color, Board>)| {
+        let of_corner = |(corner, point): (&Corner, &Vector3<f64>)| {
+            let numbers = (form.shared.as_slice(), form.heights_m.as_slice());
+            let place = prepared.sheet.lifted(surface, (corner.id, point), numbers);
+            match camera.project(pose * place) {
+                Some(pixel) => corner.pixel - pixel,
+                None => [f64::INFINITY; 2],
+            }
+        };
+        view.corners.iter().zip(&view.points).map(of_corner).collect()
+    };
+    prepared.views.iter().zip(poses).map(of_view).collect()
 }
 
 /// A shape fitted to prepared views, from the factory's numbers.
@@ -178,20 +215,34 @@ pub(super) fn fit_prepared(
 
 fn fit_with(input: &Input<'_>, prepared: &Prepared, shape: Shape<'_>, loss: Loss) -> Option<Fit> {
     let references = prepared.references();
-    let data = data(input, &references, &prepared.pictures, loss);
+    let data = data(input, prepared, (&references, &prepared.pictures), loss);
     let poses: Vec<_> = prepared.views.iter().map(|v| v.pose).collect();
-    let mut start = shape.start(input.factory);
-    let n_camera = start.len() - shape.surface.n_modes();
+    let mut free = shape.start(input.factory);
+    let mut heights_m = &[][..];
     if shape.surface == prepared.surface {
-        start[n_camera..].copy_from_slice(&prepared.surface_start_m);
+        let n_camera = shape.n_camera(&free);
+        free[n_camera..].copy_from_slice(&prepared.form.shared);
+        heights_m = &prepared.form.heights_m;
     }
-    fit(shape, &data, &start, &poses)
+    fit(shape, &data, Start { free: &free, heights_m, poses: &poses })
+}
+
+/// The same fit once more, with all that is known of the surface and of the poses.
+pub(super) fn in_full(
+    input: &Input<'_>,
+    prepared: &Prepared,
+    shape: Shape<'_>,
+    whole: &Fit,
+) -> Option<Fit> {
+    let references = prepared.references();
+    let data = data(input, prepared, (&references, &prepared.pictures), LOSS);
+    fit(shape, &Data { wanted: Wanted::Everything, ..data }, whole.start())
 }
 
 fn data<'a>(
     input: &'a Input<'_>,
-    views: &'a [&'a Measured],
-    pictures: &'a [usize],
+    prepared: &'a Prepared,
+    (views, pictures): (&'a [&'a Measured], &'a [usize]),
     loss: Loss,
 ) -> Data<'a> {
     Data {
@@ -199,8 +250,9 @@ fn data<'a>(
         views,
         pictures,
         loss,
-        surface_sigma_m: prior_sigma_m(input.board),
+        sheet: &prepared.sheet,
         cost_tolerance: COST_TOLERANCE,
+        wanted: Wanted::Camera,
     }
 }
 
@@ -215,11 +267,11 @@ pub(super) fn half_focal_px(
     let half: Vec<&Measured> = prepared.views.iter().skip(first).step_by(2).collect();
     let poses: Vec<_> = whole.poses.iter().copied().skip(first).step_by(2).collect();
     let pictures = views::pictures(&half, input.factory.width);
-    let data = data(input, &half, &pictures, LOSS);
+    let data = data(input, prepared, (&half, &pictures), LOSS);
     if data.n_pictures() < MIN_PICTURES {
         return None;
     }
-    let focal = fit(shape, &data, &whole.free, &poses)?.focal_px();
+    let focal = fit(shape, &data, Start { poses: &poses, ..whole.start() })?.focal_px();
     (focal.sigma <= MAX_FOCAL_SIGMA * focal.value).then_some(focal)
 }
 
@@ -236,21 +288,20 @@ pub(super) fn half_focal_px(
 pub(super) fn choose(
     input: &Input<'_>,
     prepared: &Prepared,
+    models: &[Model],
 ) -> Result<(Model, Vec<(Candidate, Fit)>), Error> {
-    let fits: Vec<(Model, Fit)> = Model::ALL
-        .into_iter()
-        .filter_map(|model| {
+    let fits: Vec<(Model, Fit)> = models
+        .iter()
+        .filter_map(|&model| {
             let fit = fit_prepared(input, prepared, model.shape(input.tables, prepared.surface)?)?;
             let focal = fit.focal_px();
             (focal.sigma <= MAX_FOCAL_SIGMA * focal.value).then_some((model, fit))
         })
         .collect();
-    let score = |fit: &Fit| mean(&fit.held_out);
-    let Some((_, best)) = fits.iter().min_by(|(_, a), (_, b)| score(a).total_cmp(&score(b))) else {
+    if fits.is_empty() {
         return Err(underdetermined(prepared, None));
-    };
-    let behind: Vec<f64> = fits.iter().map(|(_, fit)| behind_sigmas(fit, best)).collect();
-    let chosen = behind.iter().position(|b| *b <= 1.0).unwrap_or(0);
+    }
+    let (chosen, behind) = simplest(&fits.iter().map(|(_, fit)| fit).collect::<Vec<_>>());
     let model = fits[chosen].0;
     let candidates = fits
         .iter()
@@ -259,7 +310,8 @@ pub(super) fn choose(
             let candidate = Candidate {
                 model: *model,
                 rms_px: rms_px(input, prepared, *model, fit),
-                held_out_rms_px: prepared.held_out_rms_px(fit),
+                held_out_rms_px: prepared.held_out_rms_px(fit).value,
+                held_out_sigma_px: prepared.held_out_rms_px(fit).sigma,
                 behind_best_sigmas,
                 focal_px: fit.focal_px(),
             };
@@ -304,15 +356,13 @@ pub(super) fn shape_rms_px(
     fit: &Fit,
 ) -> f64 {
     let camera = shape.camera(input.factory, input.tables, &fit.free);
-    let surface = shape.surface_numbers(&fit.free);
+    let form = fit.form(&shape);
+    let poses = fit.poses.iter().copied();
+    let residuals = residuals(prepared, &camera, (shape.surface, &form), poses);
     let (mut squares, mut n) = (0.0, 0);
-    for (view, pose) in prepared.views.iter().zip(&fit.poses) {
-        for (corner, (point, modes)) in view.corners.iter().zip(view.points.iter().zip(&view.modes))
-        {
-            let pixel = camera.project(*pose * lifted(point, modes, surface));
-            squares += pixel.map_or(f64::INFINITY, |p| corner.pixel.distance(p).powi(2));
-            n += 1;
-        }
+    for [x, y] in residuals.into_iter().flatten() {
+        squares += x * x + y * y;
+        n += 1;
     }
     (squares / f64::from(n)).sqrt()
 }

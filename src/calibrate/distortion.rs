@@ -4,7 +4,7 @@ use super::{
     DistortionTest, Estimate, Hypothesis, Input, Lens,
     auto::{Prepared, behind_sigmas, fit_prepared, shape_rms_px},
     fit::Fit,
-    model::{Center, Shape, Warp, brown},
+    model::{Aspect, Center, Shape, Warp, brown},
     surface::Surface,
 };
 use crate::camera::{Intrinsics, RadialTable, TablePair};
@@ -13,18 +13,18 @@ use crate::camera::{Intrinsics, RadialTable, TablePair};
 pub(super) fn test(input: &Input<'_>, prepared: &Prepared) -> Option<DistortionTest> {
     let mut hypotheses = Vec::new();
     let mut add = |lens: Lens, warp: Warp<'_>| -> Option<Fit> {
-        let shape = Shape { center: Center::Free, warp, surface: prepared.surface };
+        let shape = shape_of(warp, prepared.surface);
         let fit = fit_prepared(input, prepared, shape).filter(|fit| fit.covariance.is_some())?;
         let flat = Shape { surface: Surface::Flat, ..shape };
         let flat_fit = match prepared.surface {
             Surface::Flat => fit.clone(),
-            Surface::Free => fit_prepared(input, prepared, flat)?,
+            Surface::Bend | Surface::Free => fit_prepared(input, prepared, flat)?,
         };
         hypotheses.push(Hypothesis {
             lens,
             rms_px: shape_rms_px(input, prepared, shape, &fit),
             flat_rms_px: shape_rms_px(input, prepared, flat, &flat_fit),
-            held_out_rms_px: prepared.held_out_rms_px(&fit),
+            held_out_rms_px: prepared.held_out_rms_px(&fit).value,
             focal_px: fit.focal_px(),
             center_px: [fit.estimate(1), fit.estimate(2)],
         });
@@ -37,9 +37,8 @@ pub(super) fn test(input: &Input<'_>, prepared: &Prepared) -> Option<DistortionT
         add(Lens::ForwardTable, Warp::Table(forward));
         by_table = add(Lens::FreeTable, Warp::FreeTable(inverse)).map(|fit| (fit, inverse));
     }
-    let surface = prepared.surface;
-    let one = Shape { center: Center::Free, warp: Warp::FreeRadial1, surface };
-    let two = Shape { center: Center::Free, warp: Warp::FreeRadial2, surface };
+    let one = shape_of(Warp::FreeRadial1, prepared.surface);
+    let two = shape_of(Warp::FreeRadial2, prepared.surface);
     let fit_one = fit_prepared(input, prepared, one).filter(|fit| fit.covariance.is_some())?;
     let fit_two = fit_prepared(input, prepared, two)
         .filter(|fit| fit.covariance.is_some() && behind_sigmas(&fit_one, fit) > 1.0);
@@ -63,6 +62,10 @@ pub(super) fn test(input: &Input<'_>, prepared: &Prepared) -> Option<DistortionT
         table_corner_shift_px: input.tables.map(|tables| table_shift_px(&tables.inverse, 1.0)),
         hypotheses,
     })
+}
+
+fn shape_of(warp: Warp<'_>, surface: Surface) -> Shape<'_> {
+    Shape { center: Center::Free, warp, aspect: Aspect::Fixed, surface }
 }
 
 /// How far the farthest corner lies outside its rectilinear place: r − (1 + a·m(r))·r.
@@ -90,9 +93,9 @@ fn radial_shift_px(factory: &Intrinsics, free: &[f64], radial: &[f64]) -> Option
 /// A function of the free numbers, with the σ that their covariance gives it to first order. NaN and infinite where
 /// the function has no value.
 fn propagate(fit: &Fit, function: impl Fn(&[f64]) -> Option<f64>) -> Estimate {
-    let n = fit.free.len();
+    let n = fit.free.len() + fit.heights_m.len();
     let value = function(&fit.free).unwrap_or(f64::NAN);
-    let slope: Vec<f64> = (0..n)
+    let slope: Vec<f64> = (0..fit.free.len())
         .map(|i| {
             // Half a σ to both sides.
             let step = 0.5 * fit.estimate(i).sigma;
@@ -109,8 +112,8 @@ fn propagate(fit: &Fit, function: impl Fn(&[f64]) -> Option<f64>) -> Estimate {
         .collect();
     let mut variance = 0.0;
     if let Some(covariance) = &fit.covariance {
-        for i in 0..n {
-            for j in 0..n {
+        for i in 0..slope.len() {
+            for j in 0..slope.len() {
                 variance += slope[i] * covariance[i * n + j] * slope[j];
             }
         }

@@ -3,15 +3,14 @@
 use super::{
     Estimate,
     model::Shape,
+    motion::MeanMotion,
     problem::{Measured, Reprojection},
+    surface::{Form, Sheet},
 };
 use crate::{
     camera::Intrinsics,
     geom::{Board, Color, Pose},
-    solve::{
-        Arrow, BySchur, Cholesky, Effort, Loss, Reduced, classical, clustered, larger,
-        leave_one_out_rise, minimize, total,
-    },
+    solve::{Arrow, ArrowNormal, BySchur, Effort, Loss, Pooled, Reduced, larger, minimize, total},
 };
 
 /// What a fit is made from.
@@ -22,10 +21,19 @@ pub(super) struct Data<'a> {
     /// For each view the number of the picture it is one of; pictures count from 0 without gaps.
     pub(super) pictures: &'a [usize],
     pub(super) loss: Loss,
-    /// The σ of each mode of the board's surface beforehand, metres.
-    pub(super) surface_sigma_m: f64,
+    pub(super) sheet: &'a Sheet,
     /// As [`Effort::cost_tolerance`].
     pub(super) cost_tolerance: f64,
+    pub(super) wanted: Wanted,
+}
+
+/// How much is asked of a fit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Wanted {
+    /// The camera's numbers and their covariance.
+    Camera,
+    /// Those of the surface and of the poses, too.
+    Everything,
 }
 
 impl Data<'_> {
@@ -38,22 +46,39 @@ impl Data<'_> {
     }
 }
 
+/// Where a fit begins.
+#[derive(Clone, Copy)]
+pub(super) struct Start<'a> {
+    /// The free numbers, as [`Shape`] orders them.
+    pub(super) free: &'a [f64],
+    /// The heights of a free surface; those missing are zero.
+    pub(super) heights_m: &'a [f64],
+    pub(super) poses: &'a [Pose<Color, Board>],
+}
+
 /// A fit at its minimum.
 #[derive(Clone, Debug)]
 pub(super) struct Fit {
     /// The free numbers, as [`Shape`] orders them.
     pub(super) free: Vec<f64>,
+    /// The heights of the board's corners, metres; none unless the surface is free.
+    pub(super) heights_m: Vec<f64>,
     pub(super) poses: Vec<Pose<Color, Board>>,
-    /// Covariance of `free`, row-major; `None` where the views do not determine them.
+    /// Covariance of `free` and after these `heights_m`, row-major; `None` where the views do not determine them. What
+    /// is not the camera's has the larger of both variances only where [`Wanted::Everything`] was.
     pub(super) covariance: Option<Vec<f64>>,
     /// For each picture the (robust, weighted) sum of squares with the intrinsics of all others; infinite where
     /// these do not determine them.
     pub(super) held_out: Vec<f64>,
+    /// For each picture the focal length that all others have, pixels; `None` where these do not determine it.
+    pub(super) left_out_focal_px: Vec<Option<f64>>,
+    /// How the poses go with the camera; only where [`Wanted::Everything`] was.
+    pub(super) motion: Option<MeanMotion>,
 }
 
 impl Fit {
     pub(super) fn estimate(&self, index: usize) -> Estimate {
-        let n = self.free.len();
+        let n = self.free.len() + self.heights_m.len();
         let variance = self.covariance.as_ref().map_or(f64::INFINITY, |c| c[index * n + index]);
         Estimate { value: self.free[index], sigma: variance.sqrt() }
     }
@@ -61,37 +86,40 @@ impl Fit {
     pub(super) fn focal_px(&self) -> Estimate {
         self.estimate(0)
     }
+
+    /// The numbers of the board's surface.
+    pub(super) fn form(&self, shape: &Shape<'_>) -> Form {
+        Form {
+            shared: shape.surface_numbers(&self.free).to_vec(),
+            heights_m: self.heights_m.clone(),
+        }
+    }
+
+    pub(super) fn start(&self) -> Start<'_> {
+        Start { free: &self.free, heights_m: &self.heights_m, poses: &self.poses }
+    }
 }
 
-/// The least-squares fit of `shape` from `free` and `poses`. `None` where the start does not project, or there are
-/// fewer residuals than parameters.
-pub(super) fn fit(
-    shape: Shape<'_>,
-    data: &Data<'_>,
-    free: &[f64],
-    poses: &[Pose<Color, Board>],
-) -> Option<Fit> {
-    match free.len() {
-        1 => fit_sized::<1>(shape, data, free, poses),
-        3 => fit_sized::<3>(shape, data, free, poses),
-        4 => fit_sized::<4>(shape, data, free, poses),
-        5 => fit_sized::<5>(shape, data, free, poses),
-        8 => fit_sized::<8>(shape, data, free, poses),
-        13 => fit_sized::<13>(shape, data, free, poses),
-        15 => fit_sized::<15>(shape, data, free, poses),
-        16 => fit_sized::<16>(shape, data, free, poses),
-        17 => fit_sized::<17>(shape, data, free, poses),
-        20 => fit_sized::<20>(shape, data, free, poses),
+/// The least-squares fit of `shape` from `start`. `None` where the start does not project, or there are fewer residuals
+/// than parameters.
+pub(super) fn fit(shape: Shape<'_>, data: &Data<'_>, start: Start<'_>) -> Option<Fit> {
+    match start.free.len() {
+        1 => fit_sized::<1>(shape, data, start),
+        2 => fit_sized::<2>(shape, data, start),
+        3 => fit_sized::<3>(shape, data, start),
+        4 => fit_sized::<4>(shape, data, start),
+        5 => fit_sized::<5>(shape, data, start),
+        6 => fit_sized::<6>(shape, data, start),
+        7 => fit_sized::<7>(shape, data, start),
+        8 => fit_sized::<8>(shape, data, start),
+        9 => fit_sized::<9>(shape, data, start),
+        10 => fit_sized::<10>(shape, data, start),
+        11 => fit_sized::<11>(shape, data, start),
         n => unreachable!("no shape has {n} free numbers"),
     }
 }
 
-fn fit_sized<const S: usize>(
-    shape: Shape<'_>,
-    data: &Data<'_>,
-    free: &[f64],
-    poses: &[Pose<Color, Board>],
-) -> Option<Fit> {
+fn fit_sized<const S: usize>(shape: Shape<'_>, data: &Data<'_>, start: Start<'_>) -> Option<Fit> {
     let degrees =
         (2 * data.n_corners()).checked_sub(S + 6 * data.views.len()).filter(|&d| d > 0)?;
     let problem = Reprojection::<S> {
@@ -99,24 +127,27 @@ fn fit_sized<const S: usize>(
         factory: data.factory,
         views: data.views,
         loss: data.loss,
-        surface_sigma_m: data.surface_sigma_m,
+        sheet: data.sheet,
     };
-    let shared: [f64; S] = free.try_into().expect("dispatched on the length");
-    let start = Arrow { shared, blocks: poses.to_vec() };
+    let shared: [f64; S] = start.free.try_into().expect("dispatched on the length");
+    let mut loose = start.heights_m.to_vec();
+    loose.resize(data.sheet.n_heights(shape.surface), 0.0);
+    let start = Arrow { shared, loose, blocks: start.poses.to_vec() };
     let effort = Effort { cost_tolerance: data.cost_tolerance, ..Effort::default() };
     let minimum = minimize(&BySchur(&problem), start, effort)?;
+    let Arrow { shared, loose, blocks: poses } = minimum.state;
+    let n = S + loose.len();
 
-    // The robust sum of squares, but for the rare corner beyond the loss' threshold, is the weighted one.
+    // The robust sum of squares, but for the rare corner beyond the loss' threshold, is the weighted one. Each height
+    // that was seen takes one degree of freedom at most: the prior holds them together.
+    let degrees = degrees.saturating_sub(loose.len()).max(1);
     let variance = 2.0 * minimum.cost / degrees as f64;
-    let mut pictures = vec![Reduced::<S>::ZERO; data.n_pictures()];
+    let mut pictures = vec![Reduced::zero(n); data.n_pictures()];
     let mut held_out = vec![0.0; data.n_pictures()];
     let mut diagonal = [0.0; S];
     let mut reducible = true;
     for (block, &picture) in minimum.normal.blocks.iter().zip(data.pictures) {
-        match block.reduce() {
-            Some(reduced) => pictures[picture].add(&reduced),
-            None => reducible = false,
-        }
+        reducible &= block.reduce_into(&mut pictures[picture]);
         held_out[picture] += 2.0 * block.cost();
         for (sum, d) in diagonal.iter_mut().zip(block.shared_diagonal()) {
             *sum += d;
@@ -124,19 +155,38 @@ fn fit_sized<const S: usize>(
     }
     let mut all = total(&pictures);
     all.add(&minimum.normal.prior);
-    let determined = reducible && is_determined(&all, &diagonal);
-    let covariance = determined.then(|| covariance(&all, &pictures, variance)).flatten();
-    for (sum, rise) in held_out.iter_mut().zip(leave_one_out_rise(&all, &pictures)) {
-        *sum = match rise {
-            Some(rise) if covariance.is_some() => *sum + rise,
-            _ => f64::INFINITY,
-        };
+    let pooled = Pooled::new(&all, &pictures)
+        .filter(|pooled| reducible && is_determined(pooled, &diagonal, n));
+    let n_sigmas = if data.wanted == Wanted::Everything { n } else { S };
+    let covariance = pooled.as_ref().map(|pooled| {
+        let classical: Vec<f64> = pooled.classical().iter().map(|c| variance * c).collect();
+        // With a single picture there is only the classical one.
+        match pooled.clustered(n_sigmas) {
+            Some(clustered) => larger(&classical, &clustered),
+            None => classical,
+        }
+    });
+    let left_out = match &pooled {
+        Some(pooled) => pooled.leave_one_out(),
+        None => vec![None; data.n_pictures()],
+    };
+    for (sum, left_out) in held_out.iter_mut().zip(&left_out) {
+        *sum = left_out.as_ref().map_or(f64::INFINITY, |left_out| *sum + left_out.rise);
     }
+    let left_out_focal_px =
+        left_out.iter().map(|l| l.as_ref().map(|l| shared[0] + l.shift[0])).collect();
+    let motion = covariance
+        .as_ref()
+        .filter(|_| data.wanted == Wanted::Everything)
+        .and_then(|c| mean_motion(&minimum.normal, &poses, c, (variance, shape.n_camera(&shared))));
     Some(Fit {
-        free: minimum.state.shared.to_vec(),
-        poses: minimum.state.blocks,
+        free: shared.to_vec(),
+        heights_m: loose,
+        poses,
         covariance,
         held_out,
+        left_out_focal_px,
+        motion,
     })
 }
 
@@ -144,26 +194,24 @@ fn fit_sized<const S: usize>(
 ///
 /// Eliminating the poses subtracts nearly equal numbers where they can imitate a parameter; below 1e-9 of the whole
 /// the difference is rounding.
-fn is_determined<const S: usize>(all: &Reduced<S>, diagonal: &[f64; S]) -> bool {
+fn is_determined<const S: usize>(pooled: &Pooled<'_>, diagonal: &[f64; S], n: usize) -> bool {
     const LEAST_SHARE: f64 = 1e-9;
-    let Some(factor) = Cholesky::new(&all.information) else { return false };
-    let inverse = factor.inverse();
-    (0..S).all(|i| inverse[i][i] > 0.0 && 1.0 / inverse[i][i] > LEAST_SHARE * diagonal[i])
+    let inverse = pooled.classical();
+    (0..S).all(|i| {
+        let variance = inverse[i * n + i];
+        variance > 0.0 && 1.0 / variance > LEAST_SHARE * diagonal[i]
+    })
 }
 
-/// The larger of the classical covariance and that clustered by picture, row-major. With a single picture there is
-/// only the classical one.
-fn covariance<const S: usize>(
-    all: &Reduced<S>,
-    pictures: &[Reduced<S>],
-    variance: f64,
-) -> Option<Vec<f64>> {
-    let classical = classical(all, variance)?;
-    let joined = match clustered(all, pictures) {
-        Some(clustered) => larger(&classical, &clustered),
-        None => classical,
-    };
-    Some(joined.into_iter().flatten().collect())
+fn mean_motion<const S: usize>(
+    normal: &ArrowNormal<S, 6>,
+    poses: &[Pose<Color, Board>],
+    covariance: &[f64],
+    (variance, n_camera): (f64, usize),
+) -> Option<MeanMotion> {
+    let n = covariance.len().isqrt();
+    let responses: Option<Vec<_>> = normal.blocks.iter().map(|b| b.block_response(n)).collect();
+    Some(MeanMotion::new(&responses?, poses, covariance, (variance, n_camera)))
 }
 
 #[cfg(test)]
@@ -172,7 +220,7 @@ mod tests {
     use crate::{
         calibrate::{
             Input,
-            model::{Center, Warp},
+            model::{Aspect, Center, Warp},
             surface::Surface,
             synthetic::{FACTORY, Scene, board},
             views::all_usable,
@@ -191,25 +239,27 @@ mod tests {
         let views: Vec<&Measured> = gathered.views.iter().collect();
         let poses: Vec<_> = gathered.views.iter().map(|v| v.pose).collect();
         let (center, warp, surface) = (Center::Free, Warp::FreeRadial2, Surface::Flat);
-        let shape = Shape { center, warp, surface };
-        let fit_of = |views: &[&Measured], shape: Shape<'_>, free: &[f64], poses: &[_]| {
+        let shape = Shape { center, warp, aspect: Aspect::Fixed, surface };
+        let sheet = Sheet::new(&board);
+        let fit_of = |views: &[&Measured], free: &[f64], poses: &[_]| {
             let pictures: Vec<usize> = (0..views.len()).collect();
             let data = Data {
                 factory: &FACTORY,
                 views,
                 pictures: &pictures,
                 loss: Loss::Squared,
-                surface_sigma_m: 1e-3,
+                sheet: &sheet,
                 cost_tolerance: 1e-12,
+                wanted: Wanted::Camera,
             };
-            fit(shape, &data, free, poses).unwrap()
+            fit(shape, &data, Start { free, heights_m: &[], poses }).unwrap()
         };
-        let whole = fit_of(&views, shape, &shape.start(&FACTORY), &poses);
+        let whole = fit_of(&views, &shape.start(&FACTORY), &poses);
         for left_out in 0..views.len() {
             let others: Vec<usize> = (0..views.len()).filter(|i| *i != left_out).collect();
             let their_views: Vec<&Measured> = others.iter().map(|i| views[*i]).collect();
             let their_poses: Vec<_> = others.iter().map(|i| poses[*i]).collect();
-            let refit = fit_of(&their_views, shape, &whole.free, &their_poses);
+            let refit = fit_of(&their_views, &whole.free, &their_poses);
             let camera = shape.camera(&FACTORY, None, &refit.free);
             let corners = &views[left_out].corners;
             let view =
@@ -218,6 +268,10 @@ mod tests {
             let truth = view.rms_px.powi(2) * corners.len() as f64;
             let predicted = whole.held_out[left_out];
             assert!((predicted / truth - 1.0).abs() < 0.02, "{predicted} {truth}");
+            let [focal, others] =
+                [whole.left_out_focal_px[left_out].unwrap(), refit.focal_px().value]
+                    .map(|f| f - whole.focal_px().value);
+            assert!((focal - others).abs() < 0.1 * others.abs().max(0.05), "{focal} {others}");
         }
     }
 }

@@ -1,13 +1,13 @@
 //! The calibration itself.
 
 use super::{
-    Calibration, Candidate, DistortionTest, Error, Input, Method, Model, Parameter,
+    Calibration, Candidate, DistortionTest, Error, Input, LeftOutPicture, Method, Model, Parameter,
     auto::{self, MAX_FOCAL_SIGMA, MIN_PICTURES, Prepared},
     distortion,
-    fit::{Data, Fit, fit},
+    fit::{Data, Fit, Start, Wanted, fit},
     model::Shape,
     problem::Measured,
-    surface::{self, Surface},
+    surface::{Form, Sheet, Surface},
     views,
 };
 use crate::{
@@ -60,9 +60,13 @@ pub fn calibrate(input: &Input<'_>, method: Method) -> Result<Calibration, Error
                 .ok_or_else(|| auto::underdetermined(&prepared, None))?;
             robust(input, method, model, prepared, &fit, Vec::new())
         }
-        Method::Auto => {
+        Method::Auto | Method::Unaided => {
             let prepared = auto::prepare(input)?;
-            let (model, mut found) = auto::choose(input, &prepared)?;
+            let models = match method {
+                Method::Unaided => &Model::UNAIDED[..],
+                _ => &Model::SQUARE[..],
+            };
+            let (model, mut found) = auto::choose(input, &prepared, models)?;
             let at = found.iter().position(|(c, _)| c.model == model).unwrap_or(0);
             let fit = found[at].1.clone();
             let candidates = found.drain(..).map(|(candidate, _)| candidate).collect();
@@ -87,23 +91,28 @@ fn plain(
     let shape = model.shape(input.tables, Surface::Flat).ok_or(Error::NoTables { model })?;
     let references: Vec<&Measured> = views.iter().collect();
     let pictures = views::pictures(&references, input.factory.width);
+    let sheet = Sheet::new(input.board);
     let data = Data {
         factory: input.factory,
         views: &references,
         pictures: &pictures,
         loss: Loss::Squared,
-        surface_sigma_m: surface::prior_sigma_m(input.board),
+        sheet: &sheet,
         cost_tolerance: Effort::default().cost_tolerance,
+        wanted: Wanted::Everything,
     };
     let poses: Vec<_> = views.iter().map(|v| v.pose).collect();
-    let fit = fit(shape, &data, &shape.start(input.factory), &poses);
+    let free = shape.start(input.factory);
+    let fit = fit(shape, &data, Start { free: &free, heights_m: &[], poses: &poses });
     let prepared = Prepared {
         views,
         outliers: Vec::new(),
         rejected,
         pictures,
+        sheet,
         surface: Surface::Flat,
-        surface_start_m: Vec::new(),
+        form: Form::default(),
+        surfaces: Vec::new(),
     };
     let fit = fit.ok_or_else(|| auto::underdetermined(&prepared, None))?;
     let result = Parts { method, model, shape, candidates: Vec::new() };
@@ -122,7 +131,9 @@ fn robust(
     let halves = [0, 1].map(|first| auto::half_focal_px(input, &prepared, shape, fit, first));
     let distortion = distortion::test(input, &prepared);
     let parts = Parts { method, model, shape, candidates };
-    let mut calibration = assemble(input, parts, prepared, fit)?;
+    let full = auto::in_full(input, &prepared, shape, fit)
+        .ok_or_else(|| auto::underdetermined(&prepared, None))?;
+    let mut calibration = assemble(input, parts, prepared, &full)?;
     calibration.split_half_focal_px = match halves {
         [Some(a), Some(b)] => Some([a, b]),
         _ => None,
@@ -154,19 +165,22 @@ fn assemble(
     };
     let whole = fit.covariance.as_ref().filter(|_| enough).ok_or_else(undetermined)?;
     let names = shape.names();
-    let n = fit.free.len();
+    let n = fit.free.len() + fit.heights_m.len();
     let covariance =
         (0..names.len()).flat_map(|i| whole[i * n..i * n + names.len()].iter().copied()).collect();
-    let surface_m = shape.surface_numbers(&fit.free);
+    let form = fit.form(&shape);
     let camera = shape.camera(input.factory, input.tables, &fit.free);
     let mut views = Vec::with_capacity(prepared.views.len());
     let (mut squares, mut n_corners) = (0.0, 0);
     for (view, pose) in prepared.views.iter().zip(&fit.poses) {
+        let numbers = (form.shared.as_slice(), form.heights_m.as_slice());
         let points: Vec<Point<Board>> = view
-            .points
+            .corners
             .iter()
-            .zip(&view.modes)
-            .map(|(point, modes)| surface::lifted(point, modes, surface_m))
+            .zip(&view.points)
+            .map(|(corner, point)| {
+                prepared.sheet.lifted(shape.surface, (corner.id, point), numbers)
+            })
             .collect();
         let view = View::at_pose_of(view.frame, &points, &camera, &view.corners, *pose)
             .map_err(|_| undetermined())?;
@@ -191,8 +205,32 @@ fn assemble(
         candidates,
         split_half_focal_px: None,
         distortion: None,
-        surface: surface::board_surface(input.board, surface_m, whole, n),
+        surface: prepared.sheet.surface(input.board, shape.surface, &form, whole),
+        surfaces: prepared.surfaces,
+        left_out: left_out(&prepared.views, &prepared.pictures, &fit.left_out_focal_px),
+        motion: fit.motion.clone(),
         outliers: prepared.outliers,
         rejected: prepared.rejected,
     })
+}
+
+/// The focal length without each picture, by the first frame of the picture.
+fn left_out(
+    views: &[Measured],
+    pictures: &[usize],
+    focal_px: &[Option<f64>],
+) -> Vec<LeftOutPicture> {
+    let mut found: Vec<LeftOutPicture> = focal_px
+        .iter()
+        .enumerate()
+        .filter_map(|(picture, focal_px)| {
+            let of_picture = views.iter().zip(pictures).filter(|(_, p)| **p == picture);
+            Some(LeftOutPicture {
+                frames: of_picture.map(|(view, _)| view.frame).collect(),
+                focal_px: (*focal_px)?,
+            })
+        })
+        .collect();
+    found.sort_by(|a, b| a.frames.cmp(&b.frames));
+    found
 }

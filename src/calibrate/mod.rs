@@ -49,6 +49,8 @@ mod problem;
 
 mod fit;
 
+mod motion;
+
 mod views;
 
 mod weigh;
@@ -70,6 +72,9 @@ mod tests;
 
 pub use job::{calibrate, distortion_test};
 pub use model::Model;
+pub use motion::{MeanMotion, ProjectionUncertainty};
+
+use std::fmt;
 
 use crate::{
     board::CharucoBoard,
@@ -110,6 +115,9 @@ pub enum Method {
     Paper,
     /// All usable views, corners weighed by their σ, outliers left out, the model chosen by held-out prediction.
     Auto,
+    /// As `Auto` for a camera whose factory says nothing: `factory` is where to start only, and every model frees the
+    /// centre ([`Model::UNAIDED`]).
+    Unaided,
     /// As `Auto`, with this model.
     Robust(Model),
     /// Least squares of all corners alike with this model, as `cv2.calibrateCamera`.
@@ -145,6 +153,13 @@ pub struct Calibration {
     pub distortion: Option<DistortionTest>,
     /// The board's shape, where held-out pictures are predicted better with it than with a flat board.
     pub surface: Option<BoardSurface>,
+    /// All shapes of the board tried, from simple to flexible; none with [`Method::Paper`] and [`Method::Plain`].
+    pub surfaces: Vec<SurfaceCandidate>,
+    /// The focal length without each picture, by frame.
+    pub left_out: Vec<LeftOutPicture>,
+    /// How the poses go with the camera: what [`projection_uncertainty`](Self::projection_uncertainty) needs; `None`
+    /// in a calibration that was not made here.
+    pub motion: Option<MeanMotion>,
     /// Corners left out.
     pub outliers: Vec<Outlier>,
     /// Frames left out, by frame.
@@ -155,6 +170,12 @@ impl Calibration {
     /// Corners of all views.
     pub fn n_corners(&self) -> usize {
         self.views.iter().map(|view| view.corners.len()).sum()
+    }
+
+    /// The median distance of the camera from the board's origin over all views, metres; `None` without views.
+    pub fn median_distance_m(&self) -> Option<f64> {
+        let distances: Vec<f64> = self.views.iter().map(|v| v.camera_position_m().norm()).collect();
+        (!distances.is_empty()).then(|| crate::solve::median(&distances))
     }
 
     /// A free parameter by its name, e.g. `focal_px`; `None` where it is not free.
@@ -169,13 +190,68 @@ impl Calibration {
     }
 }
 
-/// How a board deviates from flat: a smooth surface (polynomials of degree 2 to 4) estimated with the camera.
+/// The shape of a board, as it is estimated with the camera.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum SurfaceKind {
+    /// A plane.
+    Flat,
+    /// Two parabolas, along the rows and along the columns, as mrcal's `calobject_warp`.
+    Bend,
+    /// A smooth surface: a height for each corner, neighbours alike; and a print slightly stretched and sheared (after
+    /// Strobl and Hirzinger, *More accurate pinhole camera calibration with imperfect planar target*, ICCV workshops
+    /// 2011, who free all three coordinates of each corner).
+    Free,
+}
+
+impl SurfaceKind {
+    /// `flat`, `bend` or `free`: stable, for machines.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Flat => "flat",
+            Self::Bend => "bend",
+            Self::Free => "free",
+        }
+    }
+}
+
+/// One shape of the board tried.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SurfaceCandidate {
+    /// Which.
+    pub kind: SurfaceKind,
+    /// As [`Candidate::rms_px`], with the most flexible camera that the views determine.
+    pub rms_px: f64,
+    /// As [`Candidate::held_out_rms_px`].
+    pub held_out_rms_px: f64,
+    /// Standard deviation of `held_out_rms_px`.
+    pub held_out_sigma_px: f64,
+    /// As [`Candidate::behind_best_sigmas`].
+    pub behind_best_sigmas: f64,
+    /// The focal length with it.
+    pub focal_px: Estimate,
+}
+
+/// The calibration without one picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LeftOutPicture {
+    /// The frames of this picture.
+    pub frames: Vec<usize>,
+    /// The focal length that all others have, pixels (to second order: one step of the normal equations).
+    pub focal_px: f64,
+}
+
+/// How a board deviates from a flat one, estimated with the camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoardSurface {
+    /// Which form was fitted; never [`SurfaceKind::Flat`].
+    pub kind: SurfaceKind,
     /// Height of each corner, by id, metres: along the board's z, *into* the board; the best plane is taken out.
     pub heights_m: Vec<f64>,
     /// Their standard deviations, metres.
     pub sigmas_m: Vec<f64>,
+    /// By how much the print is stretched along its rows and shrunk along its columns, and sheared: x grows by e·x + g·y,
+    /// y by g·x − e·y, about its middle. Only of a [`SurfaceKind::Free`] board.
+    pub print: Option<[Estimate; 2]>,
 }
 
 impl BoardSurface {
@@ -184,6 +260,16 @@ impl BoardSurface {
         let high = self.heights_m.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let low = self.heights_m.iter().copied().fold(f64::INFINITY, f64::min);
         high - low
+    }
+
+    /// The difference between the highest and the lowest corner with its σ, metres.
+    pub fn size_m(&self) -> Estimate {
+        let by_height =
+            |a: &&usize, b: &&usize| self.heights_m[**a].total_cmp(&self.heights_m[**b]);
+        let ids: Vec<usize> = (0..self.heights_m.len()).collect();
+        let sigma = |id: Option<&usize>| id.map_or(f64::NAN, |id| self.sigmas_m[*id]);
+        let sigma = sigma(ids.iter().max_by(by_height)).hypot(sigma(ids.iter().min_by(by_height)));
+        Estimate { value: self.peak_to_valley_m(), sigma }
     }
 }
 
@@ -214,8 +300,10 @@ pub struct Candidate {
     pub rms_px: f64,
     /// RMS on pictures that were held out, pixels (2-D distance): intrinsics from all other pictures, only the six
     /// numbers of each pose fitted; corrected for these six; corners weighed as in the fit. Infinite where the other
-    /// pictures do not determine the model.
+    /// pictures do not determine the model. σ from the scatter between pictures.
     pub held_out_rms_px: f64,
+    /// Standard deviation of `held_out_rms_px`.
+    pub held_out_sigma_px: f64,
     /// By how much the held-out mean square exceeds that of the best candidate, in standard errors of that
     /// difference (pictures paired); 0 for the best.
     pub behind_best_sigmas: f64,
@@ -278,6 +366,42 @@ pub enum Rejection {
         /// Out of so many.
         n_corners: usize,
     },
+}
+
+impl Rejection {
+    /// `few_corners`, `narrow_corners`, `no_pose`, `near_accepted` or `disagrees`: stable, for machines.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::FewCorners { .. } => "few_corners",
+            Self::NarrowCorners { .. } => "narrow_corners",
+            Self::NoPose(_) => "no_pose",
+            Self::NearAccepted { .. } => "near_accepted",
+            Self::Disagrees { .. } => "disagrees",
+        }
+    }
+}
+
+impl fmt::Display for Rejection {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::FewCorners { n_corners, needed } => {
+                write!(f, "{n_corners} corners; it takes {needed}")
+            }
+            Self::NarrowCorners { n_corners } => {
+                write!(f, "{n_corners} corners that hardly spread in one direction of the board")
+            }
+            Self::NoPose(error) => write!(f, "{error}"),
+            Self::NearAccepted { accepted, distance_m } => write!(
+                f,
+                "the camera stood {:.0} mm from where it was in frame {accepted}; the paper skips views nearer than 40",
+                1e3 * distance_m
+            ),
+            Self::Disagrees { n_outliers, n_corners } => write!(
+                f,
+                "{n_outliers} of {n_corners} corners disagree with all other frames: another board, or it moved"
+            ),
+        }
+    }
 }
 
 /// How much of the lens' distortion is left in the stream, from the pixels alone. Focal length and principal point are

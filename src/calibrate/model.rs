@@ -16,14 +16,30 @@ pub enum Model {
     FocalTableCentre,
     /// One focal length, principal point, k1 k2 p1 p2 k3.
     Brown,
+    /// As `Brown`, with fy/fx free: for cameras whose factory says nothing.
+    BrownAspect,
 }
 
 impl Model {
     /// All of them, simplest first.
-    pub const ALL: [Self; 5] =
+    pub const ALL: [Self; 6] = [
+        Self::Focal,
+        Self::FocalTable,
+        Self::FocalCentre,
+        Self::FocalTableCentre,
+        Self::Brown,
+        Self::BrownAspect,
+    ];
+
+    /// Those that [`Method::Auto`](super::Method::Auto) chooses from: Apple's pixels are square.
+    pub const SQUARE: [Self; 5] =
         [Self::Focal, Self::FocalTable, Self::FocalCentre, Self::FocalTableCentre, Self::Brown];
 
-    /// `focal`, `focal+table`, `focal+centre`, `focal+table+centre`, `brown`: stable, for people and machines.
+    /// Those that ask nothing of the factory.
+    pub const UNAIDED: [Self; 3] = [Self::FocalCentre, Self::Brown, Self::BrownAspect];
+
+    /// `focal`, `focal+table`, `focal+centre`, `focal+table+centre`, `brown`, `brown+aspect`: stable, for people and
+    /// machines.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Focal => "focal",
@@ -31,6 +47,7 @@ impl Model {
             Self::FocalCentre => "focal+centre",
             Self::FocalTableCentre => "focal+table+centre",
             Self::Brown => "brown",
+            Self::BrownAspect => "brown+aspect",
         }
     }
 
@@ -46,15 +63,23 @@ impl Model {
             Self::FocalCentre => (Center::Free, Warp::None),
             Self::FocalTable => (Center::Fixed, Warp::Table(&tables?.inverse)),
             Self::FocalTableCentre => (Center::Free, Warp::Table(&tables?.inverse)),
-            Self::Brown => (Center::Free, Warp::FreeBrown),
+            Self::Brown | Self::BrownAspect => (Center::Free, Warp::FreeBrown),
         };
-        Some(Shape { center, warp, surface })
+        let aspect = if self == Self::BrownAspect { Aspect::Free } else { Aspect::Fixed };
+        Some(Shape { center, warp, aspect, surface })
     }
 }
 
 /// Is the principal point free?
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Center {
+    Fixed,
+    Free,
+}
+
+/// Is fy/fx free?
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Aspect {
     Fixed,
     Free,
 }
@@ -76,11 +101,12 @@ pub(super) enum Warp<'a> {
 }
 
 /// A camera with some of its numbers free. The free ones are, in order: focal length along x; principal point x, y
-/// (where free); those of the warp; the board's surface (where free).
+/// (where free); those of the warp; fy/fx (where free); those of the board's surface that are not heights.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Shape<'a> {
     pub(super) center: Center,
     pub(super) warp: Warp<'a>,
+    pub(super) aspect: Aspect,
     pub(super) surface: Surface,
 }
 
@@ -98,6 +124,9 @@ impl Shape<'_> {
             Warp::FreeRadial2 => &["k1", "k2"],
             Warp::FreeBrown => &["k1", "k2", "p1", "p2", "k3"],
         });
+        if self.aspect == Aspect::Free {
+            names.push("aspect");
+        }
         names
     }
 
@@ -107,7 +136,11 @@ impl Shape<'_> {
         if self.center == Center::Free {
             start.extend([intrinsics.cx, intrinsics.cy]);
         }
-        start.resize(self.names().len() + self.surface.n_modes(), 0.0);
+        start.resize(self.names().len() + self.surface.n_shared(), 0.0);
+        if self.aspect == Aspect::Free {
+            let at = self.n_camera(&start) - 1;
+            start[at] = intrinsics.fy / intrinsics.fx;
+        }
         start
     }
 
@@ -117,7 +150,26 @@ impl Shape<'_> {
             Center::Fixed => [factory.cx, factory.cy],
             Center::Free => [free[1], free[2]],
         };
-        Intrinsics { fx: free[0], fy: free[0] * (factory.fy / factory.fx), cx, cy, ..*factory }
+        Intrinsics {
+            fx: free[0],
+            fy: free[0] * self.aspect_ratio(factory, free),
+            cx,
+            cy,
+            ..*factory
+        }
+    }
+
+    /// fy/fx
+    pub(super) fn aspect_ratio(&self, factory: &Intrinsics, free: &[f64]) -> f64 {
+        match self.aspect {
+            Aspect::Fixed => factory.fy / factory.fx,
+            Aspect::Free => free[self.n_camera(free) - 1],
+        }
+    }
+
+    /// How many of the free numbers are the camera's.
+    pub(super) fn n_camera(&self, free: &[f64]) -> usize {
+        free.len() - self.surface.n_shared()
     }
 
     /// The free numbers of the warp.
@@ -126,12 +178,13 @@ impl Shape<'_> {
             Center::Fixed => 1,
             Center::Free => 3,
         };
-        &free[first..free.len() - self.surface.n_modes()]
+        let last = self.n_camera(free) - usize::from(self.aspect == Aspect::Free);
+        &free[first..last]
     }
 
-    /// The free numbers of the board's surface, metres.
+    /// The free numbers of the board's surface but for its heights.
     pub(super) fn surface_numbers<'f>(&self, free: &'f [f64]) -> &'f [f64] {
-        &free[free.len() - self.surface.n_modes()..]
+        &free[self.n_camera(free)..]
     }
 
     /// The camera with these numbers.
@@ -162,4 +215,28 @@ impl Shape<'_> {
 /// The first so many of k1 k2 p1 p2 k3, the others zero.
 pub(super) fn brown(numbers: &[f64]) -> Brown {
     Brown::from_parameters(std::array::from_fn(|i| numbers.get(i).copied().unwrap_or(0.0)))
+}
+
+/// The camera with one of its free numbers moved by a step.
+pub(super) fn moved(camera: &Camera, name: &str, step: f64) -> Camera {
+    let mut camera = camera.clone();
+    let pinhole = &mut camera.intrinsics;
+    let brown_number = ["k1", "k2", "p1", "p2", "k3"].iter().position(|k| *k == name);
+    match name {
+        "focal_px" => {
+            let aspect = pinhole.fy / pinhole.fx;
+            pinhole.fx += step;
+            pinhole.fy = pinhole.fx * aspect;
+        }
+        "center_x_px" => pinhole.cx += step,
+        "center_y_px" => pinhole.cy += step,
+        "aspect" => pinhole.fy += step * pinhole.fx,
+        _ => {}
+    }
+    if let (Some(k), Distortion::Brown(lens)) = (brown_number, &mut camera.distortion) {
+        let mut numbers = lens.parameters();
+        numbers[k] += step;
+        *lens = Brown::from_parameters(numbers);
+    }
+    camera
 }

@@ -1,8 +1,8 @@
 //! Reprojection as a bordered least-squares problem: intrinsics shared, one pose per view.
 
 use super::{
-    model::{Center, Shape, Warp, brown},
-    surface::{N_MODES, lifted},
+    model::{Aspect, Center, Shape, Warp, brown},
+    surface::Sheet,
 };
 use crate::{
     camera::{Brown, Intrinsics, RadialTable},
@@ -19,8 +19,6 @@ pub(super) struct Measured {
     pub(super) corners: Vec<Corner>,
     /// Where each corner lies on the board, metres.
     pub(super) points: Vec<Vector3<f64>>,
-    /// The modes of the board's surface there.
-    pub(super) modes: Vec<[f64; N_MODES]>,
     /// The inverse variance of both its coordinates, 1/px².
     pub(super) weights: Vec<f64>,
     /// Where the board stands, as far as known.
@@ -32,8 +30,7 @@ pub(super) struct Reprojection<'a, const S: usize> {
     pub(super) factory: &'a Intrinsics,
     pub(super) views: &'a [&'a Measured],
     pub(super) loss: Loss,
-    /// The σ of each mode of the board's surface beforehand, metres.
-    pub(super) surface_sigma_m: f64,
+    pub(super) sheet: &'a Sheet,
 }
 
 /// A pixel and its derivatives.
@@ -47,6 +44,8 @@ struct Drawn<const S: usize> {
 struct Ready<'a> {
     pinhole: Intrinsics,
     aspect: f64,
+    /// Where fy/fx stands among the shared numbers, where it is free.
+    aspect_at: Option<usize>,
     center: Center,
     n_warp: usize,
     lens: ReadyLens<'a>,
@@ -74,7 +73,8 @@ impl<'a, const S: usize> Reprojection<'a, S> {
         };
         Ready {
             pinhole: self.shape.intrinsics(self.factory, shared),
-            aspect: self.factory.fy / self.factory.fx,
+            aspect: self.shape.aspect_ratio(self.factory, shared),
+            aspect_at: (self.shape.aspect == Aspect::Free).then(|| self.shape.n_camera(shared) - 1),
             center: self.shape.center,
             n_warp: numbers.len(),
             lens,
@@ -146,6 +146,10 @@ impl Ready<'_> {
         after: Option<[[f64; 2]; 2]>,
     ) {
         let [[a, b], [c, d]] = after.unwrap_or([[1.0, 0.0], [0.0, 1.0]]);
+        if let Some(at) = self.aspect_at {
+            by_shared[0][at] = b * self.pinhole.fx * y;
+            by_shared[1][at] = d * self.pinhole.fx * y;
+        }
         let y = self.aspect * y;
         by_shared[0][0] = a * x + b * y;
         by_shared[1][0] = c * x + d * y;
@@ -165,6 +169,7 @@ impl<const S: usize> Bordered<S, 6> for Reprojection<'_, S> {
         &self,
         index: usize,
         shared: &[f64; S],
+        heights_m: &[f64],
         pose: &Self::Block,
         normal: &mut BlockNormal<S, 6>,
     ) -> bool {
@@ -175,37 +180,48 @@ impl<const S: usize> Bordered<S, 6> for Reprojection<'_, S> {
         let view = self.views[index];
         let rotation = pose.rotation.matrix();
         let normal_axis = rotation.column(2).into_owned();
-        let surface = self.shape.surface_numbers(shared);
-        let first_mode = S - surface.len();
+        let surface = self.shape.surface;
+        let numbers = self.shape.surface_numbers(shared);
+        let first = S - numbers.len();
         for (index, corner) in view.corners.iter().enumerate() {
-            let modes = &view.modes[index];
-            let turned = rotation * lifted(&view.points[index], modes, surface).coords;
+            let point = &view.points[index];
+            let place = self.sheet.lifted(surface, (corner.id, point), (numbers, heights_m));
+            let turned = rotation * place.coords;
             let Some(mut drawn) = ready.project::<S>(&(turned + pose.translation)) else {
                 return false;
             };
+            let by_surface = self.sheet.by_shared(surface, point).map(|by| rotation * by);
             let [dx, dy] = [corner.pixel.x - drawn.pixel[0], corner.pixel.y - drawn.pixel[1]];
             let square = view.weights[index] * (dx * dx + dy * dy);
             let weight = view.weights[index] * self.loss.weight(square);
             normal.add_cost(0.5 * self.loss.rho(square));
             for (residual, row) in [(dx, 0), (dy, 1)] {
                 let by_point = drawn.by_point[row];
-                let by_height = by_point[0] * normal_axis.x
-                    + by_point[1] * normal_axis.y
-                    + by_point[2] * normal_axis.z;
-                for (derivative, mode) in drawn.by_shared[row][first_mode..].iter_mut().zip(modes) {
-                    *derivative = by_height * mode;
+                let along =
+                    |v: &Vector3<f64>| by_point[0] * v.x + by_point[1] * v.y + by_point[2] * v.z;
+                let by_shared = &mut drawn.by_shared[row];
+                for (derivative, by) in by_shared[first..].iter_mut().zip(&by_surface) {
+                    *derivative = along(by);
                 }
                 let by_pose = pose::d_pixel_d_pose(by_point, &turned);
-                normal.add_row(weight, residual, &drawn.by_shared[row], &by_pose);
+                normal.add_row(weight, residual, by_shared, &by_pose);
+                if !heights_m.is_empty() {
+                    let by_height = (corner.id, along(&normal_axis));
+                    normal.add_loose((weight, residual), (by_shared, &by_pose), by_height);
+                }
             }
         }
         true
     }
 
     fn shared_precision(&self) -> [f64; S] {
-        let first_mode = S - self.shape.surface.n_modes();
-        let precision = 1.0 / (self.surface_sigma_m * self.surface_sigma_m);
-        std::array::from_fn(|i| if i < first_mode { 0.0 } else { precision })
+        let first = S - self.shape.surface.n_shared();
+        let precision = self.sheet.shared_precision(self.shape.surface);
+        std::array::from_fn(|i| if i < first { 0.0 } else { precision })
+    }
+
+    fn loose_precision(&self) -> &[f64] {
+        self.sheet.height_precision(self.shape.surface)
     }
 
     fn advance_block(&self, pose: &Self::Block, step: &[f64; 6]) -> Self::Block {
@@ -234,17 +250,20 @@ mod tests {
         check(&factory, shape(Center::Free, Warp::FreeRadial2), [450.0, 318.0, 243.0, 0.07, -0.1]);
         let brown = shape(Center::Free, Warp::FreeBrown);
         check(&factory, brown, [450.0, 318.0, 243.0, 0.07, -0.1, 0.001, -0.002, 0.03]);
+        let aspect = Shape { aspect: Aspect::Free, ..brown };
+        check(&factory, aspect, [450.0, 318.0, 243.0, 0.07, -0.1, 0.001, -0.002, 0.03, 1.02]);
     }
 
     fn shape(center: Center, warp: Warp<'_>) -> Shape<'_> {
-        Shape { center, warp, surface: Surface::Flat }
+        Shape { center, warp, aspect: Aspect::Fixed, surface: Surface::Flat }
     }
 
     /// Against differences, and against the camera of the same numbers.
     fn check<const S: usize>(factory: &Intrinsics, shape: Shape<'_>, shared: [f64; S]) {
         assert_eq!(shape.names().len(), S);
+        let sheet = Sheet::new(&crate::calibrate::synthetic::board());
         let problem =
-            Reprojection { shape, factory, views: &[], loss: Loss::Squared, surface_sigma_m: 1e-3 };
+            Reprojection { shape, factory, views: &[], loss: Loss::Squared, sheet: &sheet };
         let camera = shape.camera(factory, None, &shared);
         let turn = Rotation::from_scaled_axis(Vector3::new(0.4, -0.3, 0.2));
         for i in 0..40 {

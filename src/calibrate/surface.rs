@@ -1,111 +1,202 @@
-//! The board as it is: not quite flat.
+//! The board as it is: not quite flat, not quite as printed.
 
-use super::BoardSurface;
+use super::{BoardSurface, Estimate, SurfaceKind};
 use crate::{
     board::CharucoBoard,
     geom::{Board, Matrix3, Point, Vector3},
+    solve::DenseCholesky,
 };
 
-/// Products of Legendre polynomials of degree 2 to 4 in both directions of the board: every smooth bump that is not a
-/// plane, which the pose takes.
-pub(super) const N_MODES: usize = 12;
-
-/// How flat a board is taken to be before anything was seen: each mode's σ as a share of the board's longer side.
-/// Card and foam board bend by about that (the paper's board: 0.8 mm on 209 mm); glass is flatter, and then the
+/// How flat a board is taken to be before anything was seen: the σ of heights as a share of the board's longer side.
+/// Paper, card and foam board bend by about that (the paper's board: 0.8 mm on 209 mm); glass is flatter, and then the
 /// corners say so.
 const SIGMA_SHARE: f64 = 0.005;
 
-/// Is the board taken for flat, or is its surface estimated with the camera?
+/// Over how many squares the height of a free surface is alike beforehand: paper glued onto card ripples with about
+/// twice that from crest to crest.
+const SMOOTH_SQUARES: f64 = 2.0;
+
+/// How far a print may be stretched and sheared: printers are good to a tenth of a percent.
+const PRINT_SIGMA: f64 = 1e-3;
+
+/// A free surface has a height for each corner; beyond so many its equations would take longer than they are worth.
+const MAX_FREE_CORNERS: usize = 200;
+
+/// What is taken for known of the board's shape.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Surface {
     Flat,
+    /// Two parabolas.
+    Bend,
+    /// A smooth surface, and a print slightly stretched and sheared.
     Free,
 }
 
 impl Surface {
-    pub(super) const fn n_modes(self) -> usize {
+    /// Its numbers among the shared ones.
+    pub(super) const fn n_shared(self) -> usize {
         match self {
             Self::Flat => 0,
-            Self::Free => N_MODES,
+            Self::Bend | Self::Free => 2,
+        }
+    }
+
+    pub(super) const fn kind(self) -> SurfaceKind {
+        match self {
+            Self::Flat => SurfaceKind::Flat,
+            Self::Bend => SurfaceKind::Bend,
+            Self::Free => SurfaceKind::Free,
         }
     }
 }
 
-/// The σ of each mode beforehand, metres.
-pub(super) fn prior_sigma_m(board: &CharucoBoard) -> f64 {
-    SIGMA_SHARE * board.square_m * board.squares_x.max(board.squares_y) as f64
+/// The numbers of a surface: those shared (bend, or stretch and shear), and the heights of all corners, metres (none
+/// unless the surface is free).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Form {
+    pub(super) shared: Vec<f64>,
+    pub(super) heights_m: Vec<f64>,
 }
 
-/// All modes at a point of the board.
-pub(super) fn modes(board: &CharucoBoard, point: &Vector3<f64>) -> [f64; N_MODES] {
-    let along = |x: f64, squares: usize| 2.0 * x / (board.square_m * squares as f64) - 1.0;
-    let p = legendre(along(point.x, board.squares_x));
-    let q = legendre(along(point.y, board.squares_y));
-    let mut values = [0.0; N_MODES];
-    let mut next = values.iter_mut();
-    for degree in 2..=4 {
-        for i in 0..=degree {
-            if let Some(value) = next.next() {
-                *value = p[i] * q[degree - i];
+/// A board, and what is known of its shape beforehand.
+#[derive(Clone, Debug)]
+pub(super) struct Sheet {
+    center: [f64; 2],
+    half: [f64; 2],
+    sigma_m: f64,
+    /// The inverse covariance of the heights, row-major.
+    precision: Vec<f64>,
+    pub(super) n_corners: usize,
+}
+
+impl Sheet {
+    /// The heights of a free surface are a Gaussian process beforehand: σ as above, correlation of Matérn's form with
+    /// ν = 3/2 (once differentiable), (1 + d)·exp(−d), d = √3·distance/length.
+    pub(super) fn new(board: &CharucoBoard) -> Self {
+        let half = [board.squares_x, board.squares_y].map(|n| 0.5 * n as f64 * board.square_m);
+        let sigma_m = SIGMA_SHARE * 2.0 * half[0].max(half[1]);
+        let n = board.n_corners();
+        let mut sheet = Self { center: half, half, sigma_m, precision: Vec::new(), n_corners: n };
+        if n <= MAX_FREE_CORNERS {
+            let corners: Vec<Vector3<f64>> = (0..n).map(|id| board.corner(id).coords).collect();
+            let scale = 3.0_f64.sqrt() / (SMOOTH_SQUARES * board.square_m);
+            let covariance = (0..n * n)
+                .map(|at| {
+                    let d = scale * (corners[at / n] - corners[at % n]).norm();
+                    sigma_m * sigma_m * (1.0 + d) * (-d).exp()
+                })
+                .collect();
+            if let Some(factor) = DenseCholesky::new(covariance, n) {
+                sheet.precision = factor.inverse();
             }
         }
+        sheet
     }
-    values
-}
 
-/// P₀ to P₄.
-fn legendre(s: f64) -> [f64; 5] {
-    let s2 = s * s;
-    [
-        1.0,
-        s,
-        0.5 * (3.0 * s2 - 1.0),
-        0.5 * s * (5.0 * s2 - 3.0),
-        0.125 * (35.0 * s2 * s2 - 30.0 * s2 + 3.0),
-    ]
-}
-
-/// Where a corner of the flat board really lies, metres.
-pub(super) fn lifted(
-    point: &Vector3<f64>,
-    modes: &[f64; N_MODES],
-    coefficients: &[f64],
-) -> Point<Board> {
-    let height: f64 = coefficients.iter().zip(modes).map(|(c, m)| c * m).sum();
-    Point::new(point.x, point.y, point.z + height)
-}
-
-/// The heights of all corners, from the surface's numbers (metres) and the covariance of all free numbers (row-major,
-/// `n` by `n`, the surface's last); `None` for a flat board.
-pub(super) fn board_surface(
-    board: &CharucoBoard,
-    coefficients: &[f64],
-    covariance: &[f64],
-    n: usize,
-) -> Option<BoardSurface> {
-    if coefficients.is_empty() {
-        return None;
+    /// Is the board small enough for this surface?
+    pub(super) fn allows(&self, surface: Surface) -> bool {
+        surface != Surface::Free || !self.precision.is_empty()
     }
-    let corners: Vec<Vector3<f64>> =
-        (0..board.n_corners()).map(|id| board.corner(id).coords).collect();
-    // Each mode less its own best plane, which the poses take.
-    let columns: Vec<Vec<f64>> = (0..coefficients.len())
-        .map(|k| without_plane(&corners, corners.iter().map(|c| modes(board, c)[k]).collect()))
-        .collect();
-    let first = n - coefficients.len();
-    let mut heights_m = Vec::with_capacity(corners.len());
-    let mut sigmas_m = Vec::with_capacity(corners.len());
-    for id in 0..corners.len() {
-        heights_m.push(coefficients.iter().zip(&columns).map(|(c, column)| c * column[id]).sum());
-        let mut variance = 0.0;
-        for (i, a) in columns.iter().enumerate() {
-            for (j, b) in columns.iter().enumerate() {
-                variance += a[id] * covariance[(first + i) * n + first + j] * b[id];
-            }
+
+    /// The inverse covariance of the heights beforehand; empty where the surface has none.
+    pub(super) fn height_precision(&self, surface: Surface) -> &[f64] {
+        if surface == Surface::Free { &self.precision } else { &[] }
+    }
+
+    /// How many heights are free.
+    pub(super) fn n_heights(&self, surface: Surface) -> usize {
+        if surface == Surface::Free { self.n_corners } else { 0 }
+    }
+
+    /// The precision (1/σ²) of each of the shared numbers beforehand.
+    pub(super) fn shared_precision(&self, surface: Surface) -> f64 {
+        match surface {
+            Surface::Flat => 0.0,
+            Surface::Bend => 1.0 / (self.sigma_m * self.sigma_m),
+            Surface::Free => 1.0 / (PRINT_SIGMA * PRINT_SIGMA),
         }
-        sigmas_m.push(variance.max(0.0).sqrt());
     }
-    Some(BoardSurface { heights_m, sigmas_m })
+
+    /// How a corner moves with each of the shared numbers.
+    #[inline]
+    pub(super) fn by_shared(&self, surface: Surface, point: &Vector3<f64>) -> [Vector3<f64>; 2] {
+        let [x, y] = [point.x - self.center[0], point.y - self.center[1]];
+        match surface {
+            Surface::Flat => [Vector3::zeros(); 2],
+            // As mrcal's `calobject_warp`.
+            Surface::Bend => {
+                [x / self.half[0], y / self.half[1]].map(|s| Vector3::new(0.0, 0.0, 1.0 - s * s))
+            }
+            Surface::Free => [Vector3::new(x, -y, 0.0), Vector3::new(y, x, 0.0)],
+        }
+    }
+
+    /// Where a corner of the flat board really lies, metres.
+    #[inline]
+    pub(super) fn lifted(
+        &self,
+        surface: Surface,
+        (id, point): (usize, &Vector3<f64>),
+        (shared, heights_m): (&[f64], &[f64]),
+    ) -> Point<Board> {
+        let mut place = *point;
+        for (by, number) in self.by_shared(surface, point).iter().zip(shared) {
+            place += by * *number;
+        }
+        if let Some(height) = heights_m.get(id) {
+            place.z += height;
+        }
+        Point::from_coords(place)
+    }
+
+    /// The board's shape, from its numbers and the covariance of all free numbers (row-major, the surface's last);
+    /// `None` for a flat board.
+    pub(super) fn surface(
+        &self,
+        board: &CharucoBoard,
+        surface: Surface,
+        form: &Form,
+        covariance: &[f64],
+    ) -> Option<BoardSurface> {
+        if surface == Surface::Flat {
+            return None;
+        }
+        let corners: Vec<Vector3<f64>> =
+            (0..board.n_corners()).map(|id| board.corner(id).coords).collect();
+        // The height of each corner by each number of the surface, the best plane taken out: the poses have it.
+        let n_numbers = form.shared.len() + form.heights_m.len();
+        let columns: Vec<Vec<f64>> = (0..n_numbers)
+            .map(|k| {
+                let raw = corners.iter().enumerate().map(|(id, corner)| match surface {
+                    Surface::Bend => self.by_shared(surface, corner)[k].z,
+                    _ => f64::from(u8::from(k == form.shared.len() + id)),
+                });
+                without_plane(&corners, raw.collect())
+            })
+            .collect();
+        let n = covariance.len().isqrt();
+        let first = n - n_numbers;
+        let numbers: Vec<f64> = form.shared.iter().chain(&form.heights_m).copied().collect();
+        let mut heights_m = Vec::with_capacity(corners.len());
+        let mut sigmas_m = Vec::with_capacity(corners.len());
+        for id in 0..corners.len() {
+            heights_m.push(numbers.iter().zip(&columns).map(|(c, column)| c * column[id]).sum());
+            let mut variance = 0.0;
+            for (i, a) in columns.iter().enumerate() {
+                for (j, b) in columns.iter().enumerate() {
+                    variance += a[id] * covariance[(first + i) * n + first + j] * b[id];
+                }
+            }
+            sigmas_m.push(variance.max(0.0).sqrt());
+        }
+        let print = (surface == Surface::Free).then(|| {
+            [0, 1].map(|i| Estimate {
+                value: form.shared[i],
+                sigma: covariance[(first + i) * n + first + i].max(0.0).sqrt(),
+            })
+        });
+        Some(BoardSurface { kind: surface.kind(), heights_m, sigmas_m, print })
+    }
 }
 
 /// Values at places, less their best plane.

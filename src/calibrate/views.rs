@@ -1,6 +1,6 @@
 //! Which frames take part.
 
-use super::{Error, FrameCorners, Input, RejectedFrame, Rejection, problem::Measured, surface};
+use super::{Error, FrameCorners, Input, RejectedFrame, Rejection, problem::Measured};
 use crate::{
     board::CharucoBoard,
     camera::{Camera, Distortion},
@@ -129,9 +129,8 @@ fn measured(
     pose: Pose<Color, Board>,
 ) -> Measured {
     let points: Vec<_> = corners.iter().map(|c| board.corner(c.id).coords).collect();
-    let modes = points.iter().map(|point| surface::modes(board, point)).collect();
     let weights = vec![1.0; corners.len()];
-    Measured { frame, corners, points, modes, weights, pose }
+    Measured { frame, corners, points, weights, pose }
 }
 
 /// For each view the number of the picture it is one of: views that show the board in nearly the same place count

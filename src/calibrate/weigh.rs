@@ -90,7 +90,6 @@ pub(super) fn drop_outliers(
         let inlier = |index: usize| off[index] <= OUTLIER_SIGMAS;
         retain_indices(&mut view.corners, inlier);
         retain_indices(&mut view.points, inlier);
-        retain_indices(&mut view.modes, inlier);
         retain_indices(&mut view.weights, inlier);
         kept.push(view);
     }

@@ -28,6 +28,7 @@ impl Bordered<0, 6> for Reprojection<'_> {
         &self,
         _index: usize,
         _shared: &[f64; 0],
+        _loose: &[f64],
         pose: &Self::Block,
         normal: &mut BlockNormal<0, 6>,
     ) -> bool {
@@ -82,7 +83,7 @@ pub(super) fn refine(
     start: Pose<Color, Board>,
 ) -> Option<(Pose<Color, Board>, f64)> {
     let problem = Reprojection { camera, sightings };
-    let start = Arrow { shared: [], blocks: vec![start] };
+    let start = Arrow { shared: [], loose: Vec::new(), blocks: vec![start] };
     let effort = Effort { cost_tolerance: 1e-10, ..Effort::default() };
     let minimum = minimize(&BySchur(&problem), start, effort)?;
     Some((minimum.state.blocks[0], 2.0 * minimum.cost))

@@ -158,6 +158,7 @@ fn calibration(frames: &[FrameAudit]) -> Calibration {
         model,
         rms_px,
         held_out_rms_px,
+        held_out_sigma_px: 0.05 * held_out_rms_px,
         behind_best_sigmas: if model == Model::FocalCentre { 0.0 } else { 2.5 },
         focal_px,
     };
@@ -182,6 +183,9 @@ fn calibration(frames: &[FrameAudit]) -> Calibration {
         views: frames.iter().filter_map(|f| f.own_view.clone()).collect(),
         n_pictures: N_FRAMES,
         surface: None,
+        surfaces: Vec::new(),
+        left_out: Vec::new(),
+        motion: None,
         distortion: Some(DistortionTest {
             amplitude: Some(estimate(0.01, 0.006)),
             k1: estimate(0.002, 0.001),

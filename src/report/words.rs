@@ -317,6 +317,7 @@ pub(super) const fn model(model: Model) -> &'static str {
         Model::FocalCentre => "focal length and centre",
         Model::FocalTableCentre => "focal length and centre, Apple's table",
         Model::Brown => "Brown (k1 k2 p1 p2 k3)",
+        Model::BrownAspect => "Brown (k1 k2 p1 p2 k3), fx and fy",
     }
 }
 
@@ -328,6 +329,7 @@ pub(super) const fn model_short(model: Model) -> &'static str {
         Model::FocalCentre => "focal, centre",
         Model::FocalTableCentre => "focal, centre, table",
         Model::Brown => "Brown",
+        Model::BrownAspect => "Brown, fx, fy",
     }
 }
 

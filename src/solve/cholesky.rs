@@ -1,4 +1,4 @@
-//! Small dense symmetric systems of a size known at compile time.
+//! Small dense symmetric systems.
 
 #![allow(
     clippy::needless_range_loop,
@@ -85,56 +85,64 @@ impl<const N: usize> Cholesky<N> {
     }
 }
 
-/// Eigenvalues and eigenvectors (columns) of a symmetric matrix by Jacobi's rotations; eigenvalues in no order.
-pub(super) fn symmetric_eigen<const N: usize>(matrix: &[[f64; N]; N]) -> ([f64; N], [[f64; N]; N]) {
-    let mut a = *matrix;
-    let mut q = [[0.0; N]; N];
-    for i in 0..N {
-        q[i][i] = 1.0;
-    }
-    for _sweep in 0..50 {
-        let mut off = 0.0;
-        let mut diagonal = 0.0;
-        for i in 0..N {
-            diagonal += a[i][i] * a[i][i];
+/// As [`Cholesky`], for a size known at run time.
+#[derive(Clone, Debug)]
+pub struct DenseCholesky {
+    /// L below and on the diagonal, row-major; its diagonal is stored inverted.
+    factor: Vec<f64>,
+    n: usize,
+}
+
+impl DenseCholesky {
+    /// Factors an `n` by `n` matrix (row-major) given by its lower triangle; `None` where it is not positive definite
+    /// within f64.
+    pub fn new(matrix: Vec<f64>, n: usize) -> Option<Self> {
+        let mut l = matrix;
+        for i in 0..n {
+            let (above, row) = l.split_at_mut(i * n);
+            let whole = row[i];
             for j in 0..i {
-                off += a[i][j] * a[i][j];
+                let other = &above[j * n..j * n + j];
+                let dot: f64 = row[..j].iter().zip(other).map(|(a, b)| a * b).sum();
+                row[j] = (row[j] - dot) * above[j * n + j];
             }
-        }
-        if off <= 1e-30 * diagonal {
-            break;
-        }
-        for p in 0..N {
-            for r in p + 1..N {
-                if a[p][r] == 0.0 {
-                    continue;
-                }
-                // Golub and Van Loan, Matrix Computations, 4th ed., section 8.5.2.
-                let tau = (a[r][r] - a[p][p]) / (2.0 * a[p][r]);
-                let t = 1.0_f64.copysign(tau) / (tau.abs() + tau.hypot(1.0));
-                let c = 1.0 / t.hypot(1.0);
-                let s = t * c;
-                for k in 0..N {
-                    let (x, y) = (a[k][p], a[k][r]);
-                    a[k][p] = c * x - s * y;
-                    a[k][r] = s * x + c * y;
-                }
-                for k in 0..N {
-                    let (x, y) = (a[p][k], a[r][k]);
-                    a[p][k] = c * x - s * y;
-                    a[r][k] = s * x + c * y;
-                    let (x, y) = (q[k][p], q[k][r]);
-                    q[k][p] = c * x - s * y;
-                    q[k][r] = s * x + c * y;
-                }
+            let pivot = whole - row[..i].iter().map(|x| x * x).sum::<f64>();
+            if !(pivot > 1e-14 * whole) {
+                return None;
             }
+            row[i] = 1.0 / pivot.sqrt();
         }
+        Some(Self { factor: l, n })
     }
-    let mut values = [0.0; N];
-    for i in 0..N {
-        values[i] = a[i][i];
+
+    /// The solution x of L·Lᵀ·x = b.
+    pub fn solve(&self, b: &[f64]) -> Vec<f64> {
+        let (l, n) = (&self.factor, self.n);
+        let mut x = b.to_vec();
+        for i in 0..n {
+            let dot: f64 = l[i * n..i * n + i].iter().zip(&x).map(|(a, b)| a * b).sum();
+            x[i] = (x[i] - dot) * l[i * n + i];
+        }
+        for i in (0..n).rev() {
+            x[i] *= l[i * n + i];
+            let (before, at) = x.split_at_mut(i);
+            before.iter_mut().zip(&l[i * n..i * n + i]).for_each(|(b, a)| *b -= a * at[0]);
+        }
+        x
     }
-    (values, q)
+
+    /// (L·Lᵀ)⁻¹, row-major.
+    pub fn inverse(&self) -> Vec<f64> {
+        let n = self.n;
+        let mut inverse = vec![0.0; n * n];
+        for j in 0..n {
+            let mut unit = vec![0.0; n];
+            unit[j] = 1.0;
+            // Symmetric: a column is a row.
+            inverse[j * n..(j + 1) * n].copy_from_slice(&self.solve(&unit));
+        }
+        inverse
+    }
 }
 
 #[cfg(test)]
@@ -170,14 +178,19 @@ mod tests {
     }
 
     #[test]
-    fn eigenvectors_diagonalise() {
-        let (values, q) = symmetric_eigen(&A);
-        for k in 0..3 {
-            for i in 0..3 {
-                let image: f64 = (0..3).map(|j| A[i][j] * q[j][k]).sum();
-                assert!((image - values[k] * q[i][k]).abs() < 1e-13);
-            }
+    fn the_dense_one_is_the_same() {
+        let flat: Vec<f64> = A.iter().flatten().copied().collect();
+        let dense = DenseCholesky::new(flat, 3).unwrap();
+        let fixed = Cholesky::new(&A).unwrap();
+        let b = [1.0, -2.0, 0.5];
+        for (x, y) in dense.solve(&b).iter().zip(fixed.solve(&b)) {
+            assert!((x - y).abs() < 1e-15);
         }
-        assert!((values.iter().sum::<f64>() - 9.0).abs() < 1e-13);
+        for (x, y) in dense.inverse().iter().zip(fixed.inverse().as_flattened()) {
+            assert!((x - y).abs() < 1e-15);
+        }
+        assert!(DenseCholesky::new(vec![1.0, 2.0, 2.0, 1.0], 2).is_none());
+        assert!(DenseCholesky::new(vec![f64::NAN], 1).is_none());
+        assert!(DenseCholesky::new(Vec::new(), 0).is_some());
     }
 }

@@ -1,141 +1,130 @@
 //! How sure shared parameters are, their blocks' own parameters marginalised.
 
-#![allow(
-    clippy::needless_range_loop,
-    reason = "index loops over small matrices read as the formulas do"
-)]
-
-use super::{Cholesky, Reduced, cholesky::symmetric_eigen};
+use super::{DenseCholesky, Reduced};
 
 /// The sum of what all blocks say.
-pub fn total<const S: usize>(parts: &[Reduced<S>]) -> Reduced<S> {
-    parts.iter().fold(Reduced::ZERO, |mut sum, part| {
-        sum.add(part);
-        sum
-    })
+///
+/// Panics where there are no parts.
+pub fn total(parts: &[Reduced]) -> Reduced {
+    let mut sum = Reduced::zero(parts[0].n());
+    parts.iter().for_each(|part| sum.add(part));
+    sum
 }
 
-/// The covariance of the shared parameters if all residuals are independent with this variance, from the sum of what
-/// all parts (and what was known beforehand) say; `None` where the parameters are not determined.
-///
-/// ```text
-/// C = variance·S⁻¹,   S = Σ Sᵢ (+ prior)
-/// ```
-pub fn classical<const S: usize>(all: &Reduced<S>, variance: f64) -> Option<[[f64; S]; S]> {
-    let mut covariance = Cholesky::new(&all.information)?.inverse();
-    covariance.iter_mut().flatten().for_each(|c| *c *= variance);
-    Some(covariance)
+/// What the parts together say, and what was known before.
+#[derive(Clone, Debug)]
+pub struct Pooled<'a> {
+    parts: &'a [Reduced],
+    information: Vec<f64>,
+    /// S⁻¹, row-major.
+    inverse: Vec<f64>,
+    n: usize,
 }
 
-/// The covariance of the shared parameters if residuals are independent only *between* `parts`: within a part they may
-/// be correlated in any way. `None` where the parameters are not determined, or by a single part alone.
-///
-/// The sandwich estimator with the correction CR2 of Bell and McCaffrey (*Bias reduction in standard errors for linear
-/// regression with multi-stage samples*, 2002), unbiased where the residuals happen to be independent after all:
-///
-/// ```text
-/// S = ΣSᵢ (+ prior) = L·Lᵀ,  Mᵢ = L⁻¹·Sᵢ·L⁻ᵀ,  uᵢ = (1 − Mᵢ)^(−½)·L⁻¹·scoreᵢ,  C = L⁻ᵀ·(Σ uᵢ·uᵢᵀ)·L⁻¹
-/// ```
-pub fn clustered<const S: usize>(all: &Reduced<S>, parts: &[Reduced<S>]) -> Option<[[f64; S]; S]> {
-    let factor = Cholesky::new(&all.information)?;
-    let mut meat = [[0.0; S]; S];
-    for part in parts {
-        // M = L⁻¹·Sᵢ·L⁻ᵀ, column by column and then row by row.
-        let half = part.information.map(|column| factor.forward(&column));
-        let m = transpose(&half).map(|row| factor.forward(&row));
-        let (share, axes) = symmetric_eigen(&m);
-        let score = factor.forward(&part.score);
-        for k in 0..S {
-            let left = 1.0 - share[k];
-            if !(left > 1e-9) {
-                return None; // This part alone determines a parameter: nothing to compare it with.
-            }
-        }
-        let mut corrected = [0.0; S];
-        for k in 0..S {
-            let along: f64 = (0..S).map(|i| axes[i][k] * score[i]).sum();
-            for i in 0..S {
-                corrected[i] += axes[i][k] * along / (1.0 - share[k]).sqrt();
-            }
-        }
-        let corrected = factor.backward(&corrected);
-        for i in 0..S {
-            for j in 0..S {
-                meat[i][j] += corrected[i] * corrected[j];
-            }
-        }
+impl<'a> Pooled<'a> {
+    /// From the sum of all parts and of what was known beforehand; `None` where the parameters are not determined.
+    pub fn new(all: &Reduced, parts: &'a [Reduced]) -> Option<Self> {
+        let n = all.n();
+        let inverse = DenseCholesky::new(all.information.clone(), n)?.inverse();
+        Some(Self { parts, information: all.information.clone(), inverse, n })
     }
-    Some(meat)
+
+    /// S⁻¹, row-major: the covariance of the parameters if all residuals are independent with unit variance.
+    pub fn classical(&self) -> &[f64] {
+        &self.inverse
+    }
+
+    /// The variances of the first `n_wanted` parameters if residuals are independent only *between* the parts: within
+    /// a part they may be correlated in any way. `None` where a part alone determines one of them.
+    ///
+    /// The sandwich estimator, each part's influence on a parameter scaled such that the estimate is unbiased where
+    /// the residuals happen to be independent after all: the idea of the correction CR2 (Bell and McCaffrey, *Bias
+    /// reduction in standard errors for linear regression with multi-stage samples*, 2002), for one parameter at a
+    /// time.
+    ///
+    /// ```text
+    /// S = ΣSᵢ + prior,  q = S⁻¹·unit,  tᵢ = qᵀ·Sᵢ·q,  vᵢ = tᵢ − qᵀ·Sᵢ·S⁻¹·Sᵢ·q
+    /// variance = Σ (qᵀ·scoreᵢ)²·tᵢ/vᵢ + qᵀ·prior·q
+    /// ```
+    pub fn clustered(&self, n_wanted: usize) -> Option<Vec<f64>> {
+        let n = self.n;
+        let mut variances = Vec::with_capacity(n_wanted);
+        for wanted in 0..n_wanted {
+            let q = &self.inverse[wanted * n..(wanted + 1) * n];
+            let mut sum = 0.0;
+            let mut from_parts = 0.0;
+            for part in self.parts {
+                let sq = times(&part.information, q);
+                let t = dot(q, &sq);
+                let v = t - dot(&sq, &times(&self.inverse, &sq));
+                if t > 0.0 {
+                    if !(v > 1e-9 * t) {
+                        return None; // This part alone determines the parameter: nothing to compare it with.
+                    }
+                    sum += dot(q, &part.score).powi(2) * t / v;
+                }
+                from_parts += t;
+            }
+            let prior = (q[wanted] - from_parts).max(0.0);
+            // Rounding of a difference of equal numbers is no prior.
+            variances.push(if prior > 1e-9 * q[wanted] { sum + prior } else { sum });
+        }
+        Some(variances)
+    }
+
+    /// What each part says differently from all others; `None` where the others do not determine the parameters.
+    pub fn leave_one_out(&self) -> Vec<Option<LeftOut>> {
+        self.parts.iter().map(|part| self.without(part)).collect()
+    }
+
+    fn without(&self, part: &Reduced) -> Option<LeftOut> {
+        let n = self.n;
+        let others: Vec<f64> =
+            self.information.iter().zip(&part.information).map(|(all, own)| all - own).collect();
+        // What is left after subtraction is rounding where the others know nothing.
+        if (0..n).any(|i| !(others[i * n + i] > 1e-10 * self.information[i * n + i])) {
+            return None;
+        }
+        let minus = DenseCholesky::new(others, n)?.solve(&part.score);
+        let rise = 2.0 * dot(&part.score, &minus) + dot(&minus, &times(&part.information, &minus));
+        Some(LeftOut { shift: minus.into_iter().map(|x| -x).collect(), rise })
+    }
 }
 
-/// Classical and clustered joined: the correlations of `classical`, for each parameter the larger of both σ.
+/// What changes where one part is left out: to second order, exact for linear problems.
+///
+/// ```text
+/// shift = −(S − Sᵢ)⁻¹·scoreᵢ,   rise = −2·scoreᵢᵀ·shift + shiftᵀ·Sᵢ·shift
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct LeftOut {
+    /// By how much each parameter moves.
+    pub shift: Vec<f64>,
+    /// By how much the part's own sum of squares rises, its block parameters fitted: its residuals predicted from all
+    /// others.
+    pub rise: f64,
+}
+
+/// A covariance whose standard deviations are at least those of `variances`, one for each of the first parameters; its
+/// correlations stay.
 ///
 /// The clustered estimate sees correlation within a part that the classical one denies, but rests on few parts; so it
-/// may only enlarge, and its noisy correlations are not used.
-pub fn larger<const S: usize>(
-    classical: &[[f64; S]; S],
-    clustered: &[[f64; S]; S],
-) -> [[f64; S]; S] {
-    let mut factor = [1.0; S];
-    for i in 0..S {
-        factor[i] = (clustered[i][i] / classical[i][i]).sqrt().max(1.0);
-    }
-    let mut joined = *classical;
-    for i in 0..S {
-        for j in 0..S {
-            joined[i][j] *= factor[i] * factor[j];
-        }
-    }
-    joined
+/// may only enlarge.
+pub fn larger(covariance: &[f64], variances: &[f64]) -> Vec<f64> {
+    let n = covariance.len().isqrt();
+    let factor: Vec<f64> = (0..n)
+        .map(|i| variances.get(i).map_or(1.0, |v| (v / covariance[i * n + i]).sqrt().max(1.0)))
+        .collect();
+    (0..n * n).map(|at| covariance[at] * factor[at / n] * factor[at % n]).collect()
 }
 
-/// By how much the sum of squares of each part rises when the shared parameters are found without it: to second order
-/// the part's residuals predicted from all others, its own block parameters fitted. `None` where the others do not
-/// determine the parameters.
-///
-/// ```text
-/// δᵢ = −(S − Sᵢ)⁻¹·scoreᵢ,   rise = −2·scoreᵢᵀ·δᵢ + δᵢᵀ·Sᵢ·δᵢ
-/// ```
-///
-/// Exact for linear problems.
-pub fn leave_one_out_rise<const S: usize>(
-    all: &Reduced<S>,
-    parts: &[Reduced<S>],
-) -> Vec<Option<f64>> {
-    parts
-        .iter()
-        .map(|part| {
-            let mut others = all.information;
-            for i in 0..S {
-                for j in 0..S {
-                    others[i][j] -= part.information[i][j];
-                    // What is left after subtraction is rounding where the others know nothing.
-                }
-                if !(others[i][i] > 1e-10 * all.information[i][i]) {
-                    return None;
-                }
-            }
-            let minus_delta = Cholesky::new(&others)?.solve(&part.score);
-            let mut rise = 0.0;
-            for i in 0..S {
-                rise += 2.0 * part.score[i] * minus_delta[i];
-                for j in 0..S {
-                    rise += minus_delta[i] * part.information[i][j] * minus_delta[j];
-                }
-            }
-            Some(rise)
-        })
-        .collect()
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
-fn transpose<const S: usize>(matrix: &[[f64; S]; S]) -> [[f64; S]; S] {
-    let mut transposed = [[0.0; S]; S];
-    for i in 0..S {
-        for j in 0..S {
-            transposed[j][i] = matrix[i][j];
-        }
-    }
-    transposed
+/// A square matrix (row-major) times a vector.
+fn times(matrix: &[f64], x: &[f64]) -> Vec<f64> {
+    matrix.chunks(x.len().max(1)).map(|row| dot(row, x)).collect()
 }
 
 #[cfg(test)]
@@ -144,7 +133,7 @@ mod tests {
 
     /// A line y = p·t + q through values in groups, as blocks without parameters of their own: the reduced parts, and
     /// the sum of squares of each group at its minimum.
-    fn line(groups: &[Vec<(f64, f64)>]) -> (Vec<Reduced<2>>, [f64; 2], Vec<f64>) {
+    fn line(groups: &[Vec<(f64, f64)>]) -> (Vec<Reduced>, [f64; 2], Vec<f64>) {
         let (mut information, mut right) = ([[0.0; 2]; 2], [0.0; 2]);
         for &(t, y) in groups.iter().flatten() {
             for (i, a) in [t, 1.0].into_iter().enumerate() {
@@ -154,19 +143,19 @@ mod tests {
                 right[i] += a * y;
             }
         }
-        let x = Cholesky::new(&information).unwrap().solve(&right);
+        let x = crate::solve::Cholesky::new(&information).unwrap().solve(&right);
         let mut squares = Vec::new();
         let parts = groups
             .iter()
             .map(|group| {
-                let mut part = Reduced::ZERO;
+                let mut part = Reduced::zero(2);
                 let mut sum = 0.0;
                 for &(t, y) in group {
                     let residual = y - x[0] * t - x[1];
                     sum += residual * residual;
                     for (i, a) in [t, 1.0].into_iter().enumerate() {
                         for (j, b) in [t, 1.0].into_iter().enumerate() {
-                            part.information[i][j] += a * b;
+                            part.information[2 * i + j] += a * b;
                         }
                         part.score[i] += a * residual;
                     }
@@ -209,15 +198,15 @@ mod tests {
             .collect()
     }
 
-    /// Mean of an estimated covariance over many draws against the spread of the estimates themselves.
-    fn ratio(own: f64, common: f64, estimate: impl Fn(&[Reduced<2>]) -> [[f64; 2]; 2]) -> [f64; 2] {
+    /// Mean of estimated variances over many draws against the spread of the estimates themselves.
+    fn ratio(own: f64, common: f64, estimate: impl Fn(&Pooled<'_>) -> [f64; 2]) -> [f64; 2] {
         const N: u64 = 4000;
         let (mut predicted, mut seen) = ([0.0; 2], [0.0; 2]);
         for seed in 0..N {
             let (parts, x, _) = line(&groups(seed * 77 + 5, own, common));
-            let covariance = estimate(&parts);
+            let variances = estimate(&Pooled::new(&total(&parts), &parts).unwrap());
             for i in 0..2 {
-                predicted[i] += covariance[i][i];
+                predicted[i] += variances[i];
                 seen[i] += (x[i] - [2.0, -1.0][i]).powi(2);
             }
         }
@@ -226,44 +215,50 @@ mod tests {
 
     #[test]
     fn covariances_are_unbiased() {
+        let classical = |variance: f64| {
+            move |pooled: &Pooled<'_>| [0, 3].map(|at| variance * pooled.classical()[at])
+        };
+        let clustered =
+            |pooled: &Pooled<'_>| -> [f64; 2] { pooled.clustered(2).unwrap().try_into().unwrap() };
         // Variance of a mean of 4000 squares: ±2.2 % each, so 9 % is four standard deviations.
-        for r in ratio(0.5, 0.0, |parts| classical(&total(parts), 0.25).unwrap()) {
+        for r in ratio(0.5, 0.0, classical(0.25)) {
             assert!((r - 1.0).abs() < 0.09, "classical {r}");
         }
-        for r in ratio(0.5, 0.0, |parts| clustered(&total(parts), parts).unwrap()) {
+        for r in ratio(0.5, 0.0, clustered) {
             assert!((r - 1.0).abs() < 0.09, "clustered, independent noise {r}");
         }
-        for r in ratio(0.1, 0.5, |parts| clustered(&total(parts), parts).unwrap()) {
+        for r in ratio(0.1, 0.5, clustered) {
             assert!((r - 1.0).abs() < 0.2, "clustered, common noise {r}");
         }
-        for r in ratio(0.1, 0.5, |parts| classical(&total(parts), 0.26).unwrap()) {
+        for r in ratio(0.1, 0.5, classical(0.26)) {
             assert!(r < 0.4, "the classical one must be far too small here: {r}");
         }
     }
 
     #[test]
     fn larger_only_enlarges() {
-        let joined = larger(&[[4.0, 1.0], [1.0, 1.0]], &[[1.0, 0.0], [0.0, 9.0]]);
-        assert_eq!(joined, [[4.0, 3.0], [3.0, 9.0]]);
+        let joined = larger(&[4.0, 1.0, 1.0, 1.0], &[1.0, 9.0]);
+        assert_eq!(joined, [4.0, 3.0, 3.0, 9.0]);
+        assert_eq!(larger(&[4.0, 1.0, 1.0, 1.0], &[16.0]), [16.0, 2.0, 2.0, 1.0]);
     }
 
     #[test]
     fn leaving_one_out_is_exact_for_a_line() {
         let groups = groups(3, 0.5, 0.3);
-        let (parts, _, squares) = line(&groups);
-        for (i, rise) in leave_one_out_rise(&total(&parts), &parts).into_iter().enumerate() {
-            let others: Vec<_> = groups
-                .iter()
-                .enumerate()
-                .filter(|(j, _)| *j != i)
-                .map(|(_, g)| g.clone())
-                .collect();
+        let (parts, all_x, squares) = line(&groups);
+        let all = total(&parts);
+        for (i, left_out) in Pooled::new(&all, &parts).unwrap().leave_one_out().iter().enumerate() {
+            let mut others = groups.clone();
+            others.remove(i);
             let (_, x, _) = line(&others);
             let held_out: f64 = groups[i].iter().map(|(t, y)| (y - x[0] * t - x[1]).powi(2)).sum();
-            assert!((squares[i] + rise.unwrap() - held_out).abs() < 1e-10);
+            let LeftOut { shift, rise } = left_out.as_ref().unwrap();
+            assert!((squares[i] + rise - held_out).abs() < 1e-10);
+            assert!((all_x[0] + shift[0] - x[0]).abs() < 1e-10);
         }
         let alone = line(&groups[..1]).0;
-        assert!(leave_one_out_rise(&total(&alone), &alone)[0].is_none());
-        assert!(clustered(&total(&alone), &alone).is_none());
+        let alone = Pooled::new(&total(&alone), &alone).unwrap();
+        assert!(alone.leave_one_out()[0].is_none());
+        assert!(alone.clustered(2).is_none());
     }
 }

@@ -2,8 +2,7 @@
 //!
 //! A problem with few shared parameters and many independent blocks implements [`Bordered`]; wrapped as [`BySchur`] it
 //! is minimised by [`minimize`] (Levenberg-Marquardt). At the minimum each block is [`Reduced`] to what it says about
-//! the shared parameters; from these come covariances ([`classical`], [`clustered`]) and held-out errors
-//! ([`leave_one_out_rise`]).
+//! the shared parameters; [`Pooled`], these give covariances and held-out errors.
 //!
 //! Residuals are *observed − predicted*, derivatives are those of the prediction.
 //!
@@ -15,7 +14,14 @@
 //!
 //! impl Bordered<1, 1> for Lines {
 //!     type Block = f64;
-//!     fn linearize_block(&self, i: usize, [slope]: &[f64; 1], offset: &f64, n: &mut BlockNormal<1, 1>) -> bool {
+//!     fn linearize_block(
+//!         &self,
+//!         i: usize,
+//!         [slope]: &[f64; 1],
+//!         _loose: &[f64],
+//!         offset: &f64,
+//!         n: &mut BlockNormal<1, 1>,
+//!     ) -> bool {
 //!         for &(x, y) in &self.0[i] {
 //!             let residual = y - (slope * x + offset);
 //!             n.add_row(1.0, residual, &[x], &[1.0]);
@@ -29,7 +35,7 @@
 //! }
 //!
 //! let lines = Lines([vec![(0.0, 1.0), (1.0, 3.0)], vec![(0.0, 5.0), (2.0, 9.0)]]);
-//! let start = Arrow { shared: [0.0], blocks: vec![0.0; 2] };
+//! let start = Arrow { shared: [0.0], loose: Vec::new(), blocks: vec![0.0; 2] };
 //! let minimum = minimize(&BySchur(&lines), start, Effort::default()).expect("in the domain");
 //! assert!((minimum.state.shared[0] - 2.0).abs() < 1e-9);
 //! assert!((minimum.state.blocks[1] - 5.0).abs() < 1e-9);
@@ -49,8 +55,8 @@ mod schur;
 
 mod covariance;
 
-pub use cholesky::Cholesky;
-pub use covariance::{classical, clustered, larger, leave_one_out_rise, total};
+pub use cholesky::{Cholesky, DenseCholesky};
+pub use covariance::{LeftOut, Pooled, larger, total};
 pub use lm::{Effort, LeastSquares, Minimum, Solution, minimize};
 pub use loss::Loss;
 pub use schur::{Arrow, ArrowNormal, BlockNormal, Bordered, BySchur, Reduced};

@@ -5,18 +5,19 @@
     reason = "index loops over small matrices read as the formulas do"
 )]
 
-use super::{Cholesky, LeastSquares, Solution};
+use super::{Cholesky, DenseCholesky, LeastSquares, Solution};
 
-/// A least-squares problem of `S` shared parameters and any number of blocks of `B` parameters each, where a residual
-/// depends on the shared parameters and on one block. Bundle adjustment of intrinsics and poses is one.
+/// A least-squares problem of `S` shared parameters, any number of *loose* ones, and any number of blocks of `B`
+/// parameters each: a residual depends on the shared parameters, on one block, and on one loose parameter at most.
+/// Bundle adjustment of intrinsics (shared), heights of a board's corners (loose) and poses (blocks) is one.
 ///
 /// Its normal equations have the shape of an arrow; the blocks are eliminated one by one (Schur complement), so that
-/// time and memory grow linearly with their number:
+/// time and memory grow linearly with their number. With u the shared and loose parameters together:
 ///
 /// ```text
 /// ⎡ ΣUᵢ  W₁  W₂ … ⎤
-/// ⎢ W₁ᵀ  V₁       ⎥     (Σ Uᵢ − Wᵢ·Vᵢ⁻¹·Wᵢᵀ)·δ_shared = Σ gᵢ − Wᵢ·Vᵢ⁻¹·hᵢ
-/// ⎣ W₂ᵀ      V₂ … ⎦     δᵢ = Vᵢ⁻¹·(hᵢ − Wᵢᵀ·δ_shared)
+/// ⎢ W₁ᵀ  V₁       ⎥     (Σ Uᵢ − Wᵢ·Vᵢ⁻¹·Wᵢᵀ)·δ_u = Σ gᵢ − Wᵢ·Vᵢ⁻¹·hᵢ
+/// ⎣ W₂ᵀ      V₂ … ⎦     δᵢ = Vᵢ⁻¹·(hᵢ − Wᵢᵀ·δ_u)
 /// ```
 pub trait Bordered<const S: usize, const B: usize> {
     /// The state of one block; its tangent space has `B` dimensions.
@@ -27,6 +28,7 @@ pub trait Bordered<const S: usize, const B: usize> {
         &self,
         index: usize,
         shared: &[f64; S],
+        loose: &[f64],
         block: &Self::Block,
         normal: &mut BlockNormal<S, B>,
     ) -> bool;
@@ -36,12 +38,18 @@ pub trait Bordered<const S: usize, const B: usize> {
         [0.0; S]
     }
 
+    /// The inverse covariance with which the loose parameters are known to be near zero beforehand: row-major, of all
+    /// of them; empty for not at all.
+    fn loose_precision(&self) -> &[f64] {
+        &[]
+    }
+
     /// `block` moved by a step of its tangent space.
     fn advance_block(&self, block: &Self::Block, step: &[f64; B]) -> Self::Block;
 }
 
 /// What one block contributes to the normal equations. Matrices hold their lower triangle.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct BlockNormal<const S: usize, const B: usize> {
     /// U: shared by shared.
     u: [[f64; S]; S],
@@ -53,8 +61,20 @@ pub struct BlockNormal<const S: usize, const B: usize> {
     g: [f64; S],
     /// h: right-hand side of the block's parameters.
     h: [f64; B],
+    /// The rows of the loose parameters that this block has to do with.
+    loose: Vec<Loose<S, B>>,
     /// Half the (robust) sum of squares.
     cost: f64,
+}
+
+/// The rows of one loose parameter. Loose parameters never share a residual, so that U is diagonal among them.
+#[derive(Clone, Debug)]
+struct Loose<const S: usize, const B: usize> {
+    parameter: usize,
+    by_shared: [f64; S],
+    by_itself: f64,
+    by_block: [f64; B],
+    right: f64,
 }
 
 impl<const S: usize, const B: usize> BlockNormal<S, B> {
@@ -65,6 +85,7 @@ impl<const S: usize, const B: usize> BlockNormal<S, B> {
         v: [[0.0; B]; B],
         g: [0.0; S],
         h: [0.0; B],
+        loose: Vec::new(),
         cost: 0.0,
     };
 
@@ -92,6 +113,35 @@ impl<const S: usize, const B: usize> BlockNormal<S, B> {
         }
     }
 
+    /// The derivative of the row just added by a loose parameter. Rows of the same parameter come one after another.
+    #[inline]
+    pub fn add_loose(
+        &mut self,
+        (weight, residual): (f64, f64),
+        (d_shared, d_block): (&[f64; S], &[f64; B]),
+        (parameter, d_loose): (usize, f64),
+    ) {
+        if self.loose.last().is_none_or(|last| last.parameter != parameter) {
+            self.loose.push(Loose {
+                parameter,
+                by_shared: [0.0; S],
+                by_itself: 0.0,
+                by_block: [0.0; B],
+                right: 0.0,
+            });
+        }
+        let Some(loose) = self.loose.last_mut() else { return };
+        let row = weight * d_loose;
+        for i in 0..S {
+            loose.by_shared[i] += row * d_shared[i];
+        }
+        for i in 0..B {
+            loose.by_block[i] += row * d_block[i];
+        }
+        loose.by_itself += row * d_loose;
+        loose.right += row * residual;
+    }
+
     /// Adds to the cost: half of ρ.
     #[inline]
     pub fn add_cost(&mut self, half_rho: f64) {
@@ -103,39 +153,55 @@ impl<const S: usize, const B: usize> BlockNormal<S, B> {
         self.cost
     }
 
-    /// The block eliminated at this damping; `None` where its own parameters are not determined.
-    fn eliminate(&self, damping: f64) -> Option<Eliminated<S, B>> {
+    /// Adds this block, eliminated at this damping, to the equations of the shared and loose parameters (lower
+    /// triangle); `None` where its own parameters are not determined.
+    fn eliminate(&self, damping: f64, into: &mut Reduced) -> Option<Eliminated<B>> {
         let mut v = self.v;
         for i in 0..B {
             v[i][i] *= 1.0 + damping;
         }
         let factor = Cholesky::new(&v)?;
         let z = factor.forward(&self.h);
-        let mut reduced = Reduced { information: self.u, score: self.g };
-        let mut y = [[0.0; B]; S];
+        let mut rows: Vec<(usize, [f64; B])> = Vec::with_capacity(S + self.loose.len());
+        rows.extend((0..S).map(|i| (i, factor.forward(&self.w[i]))));
+        rows.extend(self.loose.iter().map(|l| (S + l.parameter, factor.forward(&l.by_block))));
+        let n = into.n();
         for i in 0..S {
-            y[i] = factor.forward(&self.w[i]);
-            reduced.information[i][i] += damping * self.u[i][i];
             for j in 0..=i {
-                let dot: f64 = (0..B).map(|k| y[i][k] * y[j][k]).sum();
-                reduced.information[i][j] -= dot;
+                into.information[i * n + j] += self.u[i][j];
             }
-            let dot: f64 = (0..B).map(|k| y[i][k] * z[k]).sum();
-            reduced.score[i] -= dot;
+            into.information[i * n + i] += damping * self.u[i][i];
+            into.score[i] += self.g[i];
         }
-        Some(Eliminated { factor, y, z, reduced })
+        for loose in &self.loose {
+            let i = S + loose.parameter;
+            for j in 0..S {
+                into.information[i * n + j] += loose.by_shared[j];
+            }
+            into.information[i * n + i] += (1.0 + damping) * loose.by_itself;
+            into.score[i] += loose.right;
+        }
+        for (a, (i, y)) in rows.iter().enumerate() {
+            for (j, other) in &rows[..=a] {
+                let dot: f64 = (0..B).map(|k| y[k] * other[k]).sum();
+                into.information[i.max(j) * n + i.min(j)] -= dot;
+            }
+            let dot: f64 = (0..B).map(|k| y[k] * z[k]).sum();
+            into.score[*i] -= dot;
+        }
+        Some(Eliminated { factor, rows, z })
     }
 
-    /// What this block says about the shared parameters once its own are eliminated; `None` where its own are not
-    /// determined.
-    pub fn reduce(&self) -> Option<Reduced<S>> {
-        let mut reduced = self.eliminate(0.0)?.reduced;
-        for i in 0..S {
-            for j in 0..i {
-                reduced.information[j][i] = reduced.information[i][j];
-            }
+    /// Adds what this block says about the shared and loose parameters once its own are eliminated; false, and nothing
+    /// added, where its own are not determined.
+    pub fn reduce_into(&self, sum: &mut Reduced) -> bool {
+        let mut reduced = Reduced::zero(sum.n());
+        if self.eliminate(0.0, &mut reduced).is_none() {
+            return false;
         }
-        Some(reduced)
+        reduced.mirror();
+        sum.add(&reduced);
+        true
     }
 
     /// The diagonal of U: what the block would say about each shared parameter if all others were known.
@@ -143,52 +209,75 @@ impl<const S: usize, const B: usize> BlockNormal<S, B> {
         std::array::from_fn(|i| self.u[i][i])
     }
 
-    /// (V)⁻¹, the covariance of the block's own parameters for unit variance with the shared ones known; `None` where
-    /// they are not determined.
-    pub fn block_covariance(&self) -> Option<[[f64; B]; B]> {
-        Some(Cholesky::new(&self.v)?.inverse())
+    /// (V)⁻¹, the covariance of the block's own parameters for unit variance with the others known, and how these
+    /// follow the others: δ_block = −V⁻¹·Wᵀ·δ_u, as one column per shared and loose parameter (of `n`). `None` where
+    /// the block's own are not determined.
+    pub fn block_response(&self, n: usize) -> Option<([[f64; B]; B], Vec<[f64; B]>)> {
+        let factor = Cholesky::new(&self.v)?;
+        let mut follows = vec![[0.0; B]; n];
+        let minus = |row: &[f64; B]| factor.solve(row).map(|x| -x);
+        for i in 0..S {
+            follows[i] = minus(&self.w[i]);
+        }
+        for loose in &self.loose {
+            follows[S + loose.parameter] = minus(&loose.by_block);
+        }
+        Some((factor.inverse(), follows))
     }
 }
 
-/// What one block, or a sum of blocks, says about the shared parameters.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reduced<const S: usize> {
-    /// Σ Uᵢ − Wᵢ·Vᵢ⁻¹·Wᵢᵀ, symmetric.
-    pub information: [[f64; S]; S],
+/// What one block, or a sum of blocks, says about the shared parameters and, after these, the loose ones.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reduced {
+    /// Σ Uᵢ − Wᵢ·Vᵢ⁻¹·Wᵢᵀ, symmetric, row-major.
+    pub information: Vec<f64>,
     /// Σ gᵢ − Wᵢ·Vᵢ⁻¹·hᵢ; at the minimum these sum to zero over all blocks.
-    pub score: [f64; S],
+    pub score: Vec<f64>,
 }
 
-impl<const S: usize> Reduced<S> {
-    /// Nothing known.
-    pub const ZERO: Self = Self { information: [[0.0; S]; S], score: [0.0; S] };
+impl Reduced {
+    /// Nothing known of `n` parameters.
+    pub fn zero(n: usize) -> Self {
+        Self { information: vec![0.0; n * n], score: vec![0.0; n] }
+    }
+
+    /// How many parameters there are.
+    pub fn n(&self) -> usize {
+        self.score.len()
+    }
 
     /// Adds what another block says.
     pub fn add(&mut self, other: &Self) {
-        for i in 0..S {
-            for j in 0..S {
-                self.information[i][j] += other.information[i][j];
+        self.information.iter_mut().zip(&other.information).for_each(|(a, b)| *a += b);
+        self.score.iter_mut().zip(&other.score).for_each(|(a, b)| *a += b);
+    }
+
+    /// Copies the lower triangle to the upper.
+    fn mirror(&mut self) {
+        let n = self.n();
+        for i in 0..n {
+            for j in 0..i {
+                self.information[j * n + i] = self.information[i * n + j];
             }
-            self.score[i] += other.score[i];
         }
     }
 }
 
-struct Eliminated<const S: usize, const B: usize> {
+struct Eliminated<const B: usize> {
     factor: Cholesky<B>,
-    /// L⁻¹·Wᵀ, by shared parameter.
-    y: [[f64; B]; S],
+    /// L⁻¹·Wᵀ: parameter and its column.
+    rows: Vec<(usize, [f64; B])>,
     /// L⁻¹·h
     z: [f64; B],
-    /// Lower triangle only.
-    reduced: Reduced<S>,
 }
 
-/// Shared parameters and all blocks: a state, or a step of one.
+/// Shared and loose parameters and all blocks: a state, or a step of one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Arrow<const S: usize, T> {
     /// The shared parameters.
     pub shared: [f64; S],
+    /// The loose parameters.
+    pub loose: Vec<f64>,
     /// The blocks.
     pub blocks: Vec<T>,
 }
@@ -199,7 +288,7 @@ pub struct ArrowNormal<const S: usize, const B: usize> {
     /// What each block contributes.
     pub blocks: Vec<BlockNormal<S, B>>,
     /// What is known beforehand.
-    pub prior: Reduced<S>,
+    pub prior: Reduced,
     prior_cost: f64,
 }
 
@@ -215,17 +304,11 @@ impl<P: Bordered<S, B>, const S: usize, const B: usize> LeastSquares for BySchur
     fn linearize(&self, state: &Self::State) -> Option<Self::Normal> {
         let mut blocks = vec![BlockNormal::ZERO; state.blocks.len()];
         for (index, (block, normal)) in state.blocks.iter().zip(&mut blocks).enumerate() {
-            if !self.0.linearize_block(index, &state.shared, block, normal) {
+            if !self.0.linearize_block(index, &state.shared, &state.loose, block, normal) {
                 return None;
             }
         }
-        let mut prior = Reduced::ZERO;
-        let mut prior_cost = 0.0;
-        for (i, precision) in self.0.shared_precision().into_iter().enumerate() {
-            prior.information[i][i] = precision;
-            prior.score[i] = -precision * state.shared[i];
-            prior_cost += 0.5 * precision * state.shared[i] * state.shared[i];
-        }
+        let (prior, prior_cost) = self.prior(state);
         Some(ArrowNormal { blocks, prior, prior_cost })
     }
 
@@ -235,31 +318,36 @@ impl<P: Bordered<S, B>, const S: usize, const B: usize> LeastSquares for BySchur
 
     fn solve(&self, normal: &Self::Normal, damping: f64) -> Option<Solution<Self::Step>> {
         let ArrowNormal { blocks: normal, prior, .. } = normal;
-        let mut total = *prior;
-        for i in 0..S {
-            total.information[i][i] *= 1.0 + damping;
+        let n = prior.n();
+        let mut total = prior.clone();
+        for i in 0..n {
+            total.information[i * n + i] *= 1.0 + damping;
         }
         let mut eliminated = Vec::with_capacity(normal.len());
         for block in normal {
-            let block = block.eliminate(damping)?;
-            total.add(&block.reduced);
-            eliminated.push(block);
+            eliminated.push(block.eliminate(damping, &mut total)?);
         }
-        let shared = Cholesky::new(&total.information)?.solve(&total.score);
+        let border = DenseCholesky::new(total.information, n)?.solve(&total.score);
         let mut blocks = Vec::with_capacity(normal.len());
         // ½·δᵀ·(damping·D·δ + g): what the linear model says (Madsen, Nielsen, Tingleff 2004, equation 3.14).
         let mut decrease = 0.0;
-        for i in 0..S {
-            let damped = damping * prior.information[i][i] * shared[i];
-            decrease += shared[i] * (damped + prior.score[i]);
+        for i in 0..n {
+            let damped = damping * prior.information[i * n + i] * border[i];
+            decrease += border[i] * (damped + prior.score[i]);
         }
-        for (block, Eliminated { factor, y, z, .. }) in normal.iter().zip(&eliminated) {
+        for (block, Eliminated { factor, rows, z }) in normal.iter().zip(&eliminated) {
             let mut rest = *z;
-            for i in 0..S {
+            for (i, y) in rows {
                 for k in 0..B {
-                    rest[k] -= y[i][k] * shared[i];
+                    rest[k] -= y[k] * border[*i];
                 }
-                decrease += shared[i] * (damping * block.u[i][i] * shared[i] + block.g[i]);
+            }
+            for i in 0..S {
+                decrease += border[i] * (damping * block.u[i][i] * border[i] + block.g[i]);
+            }
+            for loose in &block.loose {
+                let step = border[S + loose.parameter];
+                decrease += step * (damping * loose.by_itself * step + loose.right);
             }
             let step = factor.backward(&rest);
             for k in 0..B {
@@ -267,7 +355,8 @@ impl<P: Bordered<S, B>, const S: usize, const B: usize> LeastSquares for BySchur
             }
             blocks.push(step);
         }
-        let step = Arrow { shared, blocks };
+        let shared = std::array::from_fn(|i| border[i]);
+        let step = Arrow { shared, loose: border[S..].to_vec(), blocks };
         Some(Solution { step, predicted_decrease: 0.5 * decrease })
     }
 
@@ -276,13 +365,36 @@ impl<P: Bordered<S, B>, const S: usize, const B: usize> LeastSquares for BySchur
         for i in 0..S {
             shared[i] += step.shared[i];
         }
+        let loose = state.loose.iter().zip(&step.loose).map(|(value, step)| value + step).collect();
         let blocks = state
             .blocks
             .iter()
             .zip(&step.blocks)
             .map(|(block, step)| self.0.advance_block(block, step))
             .collect();
-        Arrow { shared, blocks }
+        Arrow { shared, loose, blocks }
+    }
+}
+
+impl<P: Bordered<S, B>, const S: usize, const B: usize> BySchur<'_, P, S, B> {
+    /// What is known beforehand, and what it costs at a state.
+    fn prior(&self, state: &Arrow<S, P::Block>) -> (Reduced, f64) {
+        let n = S + state.loose.len();
+        let mut prior = Reduced::zero(n);
+        let mut cost = 0.0;
+        for (i, precision) in self.0.shared_precision().into_iter().enumerate() {
+            prior.information[i * n + i] = precision;
+            prior.score[i] = -precision * state.shared[i];
+            cost += 0.5 * precision * state.shared[i] * state.shared[i];
+        }
+        let precision = self.0.loose_precision();
+        for (i, row) in precision.chunks(state.loose.len().max(1)).enumerate() {
+            prior.information[(S + i) * n + S..][..row.len()].copy_from_slice(row);
+            let dot: f64 = row.iter().zip(&state.loose).map(|(p, x)| p * x).sum();
+            prior.score[S + i] = -dot;
+            cost += 0.5 * dot * state.loose[i];
+        }
+        (prior, cost)
     }
 }
 
@@ -291,9 +403,12 @@ mod tests {
     use super::*;
     use crate::solve::{Effort, minimize};
 
-    /// Curves y = aᵢ·exp(−k·t) + bᵢ + c·t²: k and c shared, a and b of each curve its own.
+    /// Curves y = aᵢ·exp(−k·t) + bᵢ + c·t² (1 + l_j at every tenth t): k and c shared, l loose, a and b of each curve its
+    /// own.
     struct Decays {
         precision: [f64; 2],
+        /// Of three loose parameters, or none.
+        loose_precision: Vec<f64>,
         curves: Vec<Vec<(f64, f64)>>,
     }
 
@@ -304,13 +419,22 @@ mod tests {
             &self,
             index: usize,
             &[k, c]: &[f64; 2],
+            loose: &[f64],
             &[a, b]: &[f64; 2],
             normal: &mut BlockNormal<2, 2>,
         ) -> bool {
             for &(t, y) in &self.curves[index] {
                 let e = (-k * t).exp();
-                let residual = y - (a * e + b + c * t * t);
-                normal.add_row(1.0, residual, &[-t * a * e, t * t], &[e, 1.0]);
+                let parameter = (10.0 * t / 3.0).round() as usize;
+                let bump = if parameter % 10 == 0 { loose.get(parameter / 10) } else { None };
+                let bump = bump.copied().unwrap_or(0.0);
+                let residual = y - (a * e + b + c * t * t * (1.0 + bump));
+                let by_shared = [-t * a * e, t * t * (1.0 + bump)];
+                normal.add_row(1.0, residual, &by_shared, &[e, 1.0]);
+                if parameter % 10 == 0 && !loose.is_empty() {
+                    let at = (parameter / 10, c * t * t);
+                    normal.add_loose((1.0, residual), (&by_shared, &[e, 1.0]), at);
+                }
                 normal.add_cost(0.5 * residual * residual);
             }
             k > 0.0
@@ -318,6 +442,10 @@ mod tests {
 
         fn shared_precision(&self) -> [f64; 2] {
             self.precision
+        }
+
+        fn loose_precision(&self) -> &[f64] {
+            &self.loose_precision
         }
 
         fn advance_block(&self, block: &[f64; 2], step: &[f64; 2]) -> [f64; 2] {
@@ -341,8 +469,8 @@ mod tests {
             })
             .collect();
         (
-            Decays { precision: [0.0; 2], curves },
-            Arrow { shared: [0.4, 0.0], blocks: vec![[1.0, 0.0]; 3] },
+            Decays { precision: [0.0; 2], loose_precision: Vec::new(), curves },
+            Arrow { shared: [0.4, 0.0], loose: Vec::new(), blocks: vec![[1.0, 0.0]; 3] },
         )
     }
 
@@ -361,15 +489,18 @@ mod tests {
     fn step_solves_the_whole_system() {
         let (mut problem, mut start) = decays(0.01);
         problem.precision[1] = 7.0;
+        problem.loose_precision = vec![3.0, 1.0, 0.0, 1.0, 5.0, 0.5, 0.0, 0.5, 4.0];
         start.shared[1] = 0.2;
+        start.loose = vec![0.3, -0.2, 0.1];
         let problem = BySchur(&problem);
         let normal = problem.linearize(&start).unwrap();
         for damping in [0.0, 0.3] {
             let Solution { step, predicted_decrease } = problem.solve(&normal, damping).unwrap();
-            let mut whole = [[0.0; 8]; 8];
-            let mut right = [0.0; 8];
+            // Shared 0 and 1, loose 2 to 4, blocks from 5.
+            let mut whole = [[0.0; 11]; 11];
+            let mut right = [0.0; 11];
             for (index, block) in normal.blocks.iter().enumerate() {
-                let at = 2 + 2 * index;
+                let at = 5 + 2 * index;
                 for i in 0..2 {
                     right[i] += block.g[i];
                     right[at + i] = block.h[i];
@@ -380,23 +511,41 @@ mod tests {
                         whole[i][at + j] = block.w[i][j];
                     }
                 }
+                for loose in &block.loose {
+                    let row = 2 + loose.parameter;
+                    right[row] += loose.right;
+                    whole[row][row] += loose.by_itself;
+                    for i in 0..2 {
+                        whole[row][i] += loose.by_shared[i];
+                        whole[i][row] += loose.by_shared[i];
+                        whole[row][at + i] = loose.by_block[i];
+                        whole[at + i][row] = loose.by_block[i];
+                    }
+                }
             }
             whole[1][1] += 7.0;
             right[1] -= 7.0 * start.shared[1];
+            let prior = [[3.0, 1.0, 0.0], [1.0, 5.0, 0.5], [0.0, 0.5, 4.0]];
+            for i in 0..3 {
+                for j in 0..3 {
+                    whole[2 + i][2 + j] += prior[i][j];
+                    right[2 + i] -= prior[i][j] * start.loose[j];
+                }
+            }
             let undamped = whole;
-            for i in 0..8 {
+            for i in 0..11 {
                 whole[i][i] *= 1.0 + damping;
             }
             let x = Cholesky::new(&whole).unwrap().solve(&right);
-            let flat: Vec<f64> =
-                step.shared.iter().chain(step.blocks.iter().flatten()).copied().collect();
-            for i in 0..8 {
+            let border = step.shared.iter().chain(&step.loose);
+            let flat: Vec<f64> = border.chain(step.blocks.iter().flatten()).copied().collect();
+            for i in 0..11 {
                 assert!((flat[i] - x[i]).abs() < 1e-10 * x[i].abs().max(1.0));
             }
             let mut quadratic = 0.0;
-            for i in 0..8 {
+            for i in 0..11 {
                 quadratic += right[i] * x[i];
-                for j in 0..8 {
+                for j in 0..11 {
                     quadratic -= 0.5 * x[i] * undamped[i][j] * x[j];
                 }
             }
@@ -406,15 +555,17 @@ mod tests {
 
     #[test]
     fn scores_vanish_at_the_minimum() {
-        let (problem, start) = decays(0.05);
+        let (mut problem, mut start) = decays(0.05);
+        problem.loose_precision = vec![3.0, 1.0, 0.0, 1.0, 5.0, 0.5, 0.0, 0.5, 4.0];
+        start.loose = vec![0.0; 3];
         let minimum = minimize(&BySchur(&problem), start, Effort::default()).unwrap();
         assert!(minimum.converged);
-        let mut total = Reduced::ZERO;
+        let mut total = minimum.normal.prior.clone();
         for block in &minimum.normal.blocks {
-            total.add(&block.reduce().unwrap());
+            assert!(block.reduce_into(&mut total));
         }
         assert!(total.score.iter().all(|s| s.abs() < 1e-6), "{total:?}");
-        assert!(total.information[0][1] == total.information[1][0]);
+        assert!(total.information[1] == total.information[5]);
     }
 
     #[test]

@@ -61,6 +61,99 @@ pub struct Calibration {
     pub views: Vec<View>,
     /// Corners that disagree with all others and were left out.
     pub outliers: Vec<Outlier>,
+    /// Frames that were left out.
+    #[serde(default)]
+    pub rejected: Vec<Rejected>,
+    /// The shapes of the board that were tried.
+    #[serde(default)]
+    pub surfaces: Vec<Surface>,
+    /// The board's shape; `null` where it was taken for flat.
+    #[serde(default)]
+    pub board_surface: Option<BoardSurface>,
+    /// The focal length without each picture.
+    #[serde(default)]
+    pub left_out: Vec<LeftOut>,
+    /// What a wrong calibration would cost over the image.
+    #[serde(default)]
+    pub projection_uncertainty: Option<ProjectionUncertainty>,
+}
+
+/// A frame that was left out.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Rejected {
+    /// Index of the frame in the recording.
+    pub frame: usize,
+    /// `few_corners`, `narrow_corners`, `no_pose`, `near_accepted` or `disagrees`.
+    pub reason: String,
+    /// The same in a sentence.
+    pub why: String,
+}
+
+/// A shape of the board that was tried.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Surface {
+    /// `flat`, `bend` or `free`.
+    pub kind: String,
+    /// On the corners it was fitted to.
+    pub rms_px: Option<f64>,
+    /// On pictures it had not seen.
+    pub held_out_rms_px: Option<f64>,
+    /// Standard deviation of `held_out_rms_px`.
+    pub held_out_sigma_px: Option<f64>,
+    /// By how many standard errors of the difference it predicts worse than the best.
+    pub behind_best_sigmas: Option<f64>,
+    /// The focal length with it.
+    pub focal_px: Option<f64>,
+    /// Standard deviation of `focal_px`.
+    pub focal_sigma_px: Option<f64>,
+}
+
+/// How the board deviates from a flat one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BoardSurface {
+    /// `bend` or `free`.
+    pub kind: String,
+    /// From the highest corner to the lowest.
+    pub peak_to_valley_mm: Option<f64>,
+    /// Standard deviation of `peak_to_valley_mm`.
+    pub peak_to_valley_sigma_mm: Option<f64>,
+    /// Of each corner, by id: into the board, the best plane taken out.
+    pub heights_mm: Vec<Option<f64>>,
+    /// Standard deviations of `heights_mm`.
+    pub sigmas_mm: Vec<Option<f64>>,
+    /// By how much the print is longer along its rows and shorter along its columns than square; `null` where that was
+    /// not estimated.
+    pub print_stretch: Option<f64>,
+    /// Standard deviation of `print_stretch`.
+    pub print_stretch_sigma: Option<f64>,
+    /// How much x grows with y and y with x.
+    pub print_shear: Option<f64>,
+    /// Standard deviation of `print_shear`.
+    pub print_shear_sigma: Option<f64>,
+}
+
+/// The focal length that all other pictures have.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LeftOut {
+    /// The frames of the picture that was left out.
+    pub frames: Vec<usize>,
+    /// Without them.
+    pub focal_px: Option<f64>,
+}
+
+/// What a wrong calibration would cost: one standard deviation of where points at one depth are drawn.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ProjectionUncertainty {
+    /// Places across the image, from the first pixel's centre to the last one's.
+    pub columns: usize,
+    /// Places down the image.
+    pub rows: usize,
+    /// Distance of the points along the optical axis.
+    pub depth_m: f64,
+    /// In the worst direction, row by row.
+    pub sigma_px: Vec<Option<f64>>,
+    /// The same sideways at `depth_m`.
+    pub sigma_mm: Vec<Option<f64>>,
 }
 
 /// A free parameter.
@@ -83,6 +176,12 @@ pub struct Candidate {
     pub rms_px: Option<f64>,
     /// On corners it had not seen.
     pub held_out_rms_px: Option<f64>,
+    /// Standard deviation of `held_out_rms_px`.
+    #[serde(default)]
+    pub held_out_sigma_px: Option<f64>,
+    /// By how many standard errors of the difference it predicts worse than the best.
+    #[serde(default)]
+    pub behind_best_sigmas: Option<f64>,
     /// Its focal length.
     pub focal_px: Option<f64>,
     /// Standard deviation of `focal_px`.
@@ -144,6 +243,9 @@ pub struct Outlier {
     pub id: usize,
     /// Distance to its prediction.
     pub residual_px: Option<f64>,
+    /// The same in standard deviations of what corners like it scatter by.
+    #[serde(default)]
+    pub residual_sigmas: Option<f64>,
 }
 
 /// How the lens bends straight lines.
@@ -230,6 +332,19 @@ impl Calibration {
             distortion_test: calibration.distortion.as_ref().map(DistortionTest::from),
             views: calibration.views.iter().map(View::from).collect(),
             outliers: calibration.outliers.iter().map(Outlier::from).collect(),
+            rejected: calibration.rejected.iter().map(Rejected::from).collect(),
+            surfaces: calibration.surfaces.iter().map(Surface::from).collect(),
+            board_surface: calibration.surface.as_ref().map(BoardSurface::from),
+            left_out: calibration
+                .left_out
+                .iter()
+                .map(|l| LeftOut { frames: l.frames.clone(), focal_px: finite(l.focal_px) })
+                .collect(),
+            projection_uncertainty: calibration
+                .median_distance_m()
+                .and_then(|depth_m| calibration.projection_uncertainty(17, 13, depth_m))
+                .as_ref()
+                .map(ProjectionUncertainty::from),
         }
     }
 
@@ -272,8 +387,68 @@ impl From<&calibrate::Candidate> for Candidate {
             model: model_name(candidate.model).to_owned(),
             rms_px: finite(candidate.rms_px),
             held_out_rms_px: finite(candidate.held_out_rms_px),
+            held_out_sigma_px: finite(candidate.held_out_sigma_px),
+            behind_best_sigmas: finite(candidate.behind_best_sigmas),
             focal_px: finite(candidate.focal_px.value),
             focal_sigma_px: finite(candidate.focal_px.sigma),
+        }
+    }
+}
+
+impl From<&calibrate::RejectedFrame> for Rejected {
+    fn from(rejected: &calibrate::RejectedFrame) -> Self {
+        Self {
+            frame: rejected.frame,
+            reason: rejected.reason.name().to_owned(),
+            why: rejected.reason.to_string(),
+        }
+    }
+}
+
+impl From<&calibrate::SurfaceCandidate> for Surface {
+    fn from(surface: &calibrate::SurfaceCandidate) -> Self {
+        Self {
+            kind: surface.kind.name().to_owned(),
+            rms_px: finite(surface.rms_px),
+            held_out_rms_px: finite(surface.held_out_rms_px),
+            held_out_sigma_px: finite(surface.held_out_sigma_px),
+            behind_best_sigmas: finite(surface.behind_best_sigmas),
+            focal_px: finite(surface.focal_px.value),
+            focal_sigma_px: finite(surface.focal_px.sigma),
+        }
+    }
+}
+
+impl From<&calibrate::BoardSurface> for BoardSurface {
+    fn from(surface: &calibrate::BoardSurface) -> Self {
+        let mm = |metres: &[f64]| metres.iter().map(|m| finite(1e3 * m)).collect();
+        let size = surface.size_m();
+        let print = |i: usize| surface.print.map(|print| print[i]);
+        let value = |e: Option<Estimate>| e.and_then(|e| finite(e.value));
+        let sigma = |e: Option<Estimate>| e.and_then(|e| finite(e.sigma));
+        Self {
+            kind: surface.kind.name().to_owned(),
+            peak_to_valley_mm: finite(1e3 * size.value),
+            peak_to_valley_sigma_mm: finite(1e3 * size.sigma),
+            heights_mm: mm(&surface.heights_m),
+            sigmas_mm: mm(&surface.sigmas_m),
+            print_stretch: value(print(0)),
+            print_stretch_sigma: sigma(print(0)),
+            print_shear: value(print(1)),
+            print_shear_sigma: sigma(print(1)),
+        }
+    }
+}
+
+impl From<&calibrate::ProjectionUncertainty> for ProjectionUncertainty {
+    fn from(grid: &calibrate::ProjectionUncertainty) -> Self {
+        let known = |values: &[f64]| values.iter().map(|v| finite(*v)).collect();
+        Self {
+            columns: grid.columns,
+            rows: grid.rows,
+            depth_m: grid.depth_m,
+            sigma_px: known(&grid.sigma_px),
+            sigma_mm: known(&grid.sigma_mm),
         }
     }
 }
@@ -323,7 +498,12 @@ impl From<&pose::View> for View {
 
 impl From<&calibrate::Outlier> for Outlier {
     fn from(outlier: &calibrate::Outlier) -> Self {
-        Self { frame: outlier.frame, id: outlier.id, residual_px: finite(outlier.residual_px) }
+        Self {
+            frame: outlier.frame,
+            id: outlier.id,
+            residual_px: finite(outlier.residual_px),
+            residual_sigmas: finite(outlier.residual_sigmas),
+        }
     }
 }
 

@@ -62,6 +62,7 @@ pub(super) const fn model_name(model: Model) -> &'static str {
         Model::FocalCentre => "focal+centre",
         Model::FocalTableCentre => "focal+table+centre",
         Model::Brown => "brown",
+        Model::BrownAspect => "brown+aspect",
     }
 }
 
