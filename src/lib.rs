@@ -66,3 +66,6 @@ pub mod simulate;
 
 // What leaves the library: JSON, HTML, SVG.
 pub mod report;
+
+// A calibration as other programs read it.
+pub mod export;

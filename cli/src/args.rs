@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Parser, Subcommand, ValueEnum, builder::PossibleValuesParser};
 use truedepth::{
     board::{self, CharucoBoard, Dictionary},
+    calibrate::Model,
     simulate::{Device, Fault, FaultError},
 };
 
@@ -105,7 +106,7 @@ pub(crate) enum Command {
 
     /// Measure the camera's intrinsics, with uncertainties
     ///
-    /// The part of `audit` that looks at the camera only. What --json prints can be given to
+    /// The part of `audit` that looks at the colour images only; depth is not read. What --json prints can be given to
     /// `audit --calibration` for recordings that cannot calibrate themselves, like a few views straight at the board.
     #[command(after_help = CALIBRATE_EXAMPLES)]
     Calibrate(CalibrateArgs),
@@ -339,7 +340,10 @@ fn tolerance(text: &str) -> Result<Tolerance, String> {
 
 #[derive(Debug, clap::Args)]
 pub(crate) struct CalibrateArgs {
-    /// The recording: a folder as the capture app writes it, or a zip of it
+    /// A recording (folder or zip), or a folder of PNG or JPEG images of one camera
+    ///
+    /// Images without metadata need --board. Nothing is known of their camera: the principal point is always
+    /// estimated, and fx and fy each where held-out images ask for it.
     #[arg(value_name = "REC")]
     pub(crate) recording: PathBuf,
 
@@ -347,17 +351,58 @@ pub(crate) struct CalibrateArgs {
     #[arg(long, default_value = "auto")]
     pub(crate) method: Method,
 
+    /// Fit this camera model instead of the one that predicts held-out views best
+    #[arg(long, value_name = "MODEL", conflicts_with = "method", value_parser = PossibleValuesParser::new(Model::ALL.map(Model::name)))]
+    pub(crate) model: Option<String>,
+
     #[command(flatten)]
     pub(crate) input: InputArgs,
 
     #[command(flatten)]
     pub(crate) json: JsonArgs,
+
+    /// Write the calibration for another program
+    ///
+    /// Without --format its name decides: .cameramodel is mrcal's, .txt COLMAP's cameras.txt, .yml and .yaml OpenCV's,
+    /// .json what --json prints. A lens that the format does not hold is fitted to the nearest it does, and how far off
+    /// that is gets said.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) export: Option<PathBuf>,
+
+    /// The program that reads it
+    #[arg(long, value_name = "FORMAT", requires = "export")]
+    pub(crate) format: Option<ExportFormat>,
+
+    /// Replace the file of --export where it is there already
+    #[arg(long, requires = "export")]
+    pub(crate) force: bool,
+}
+
+/// Whose file is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ExportFormat {
+    /// What --json prints
+    Truedepth,
+    /// OpenCV's FileStorage, YAML
+    Opencv,
+    /// Kalibr's camchain.yaml
+    Kalibr,
+    /// mrcal's .cameramodel
+    Mrcal,
+    /// COLMAP's cameras.txt
+    Colmap,
+    /// ROS' camera_info, YAML
+    Ros,
+    /// Open3D's PinholeCameraIntrinsic, JSON
+    Open3d,
 }
 
 const CALIBRATE_EXAMPLES: &str = "\
 Examples:
   truedepth calibrate my-recording
   truedepth calibrate my-recording --method paper
+  truedepth calibrate my-recording --model brown --export camera.yml
+  truedepth calibrate images --board 7x5:30mm:21mm:4X4_50 --export camchain.yaml --format kalibr
   truedepth calibrate my-recording --json > camera.json";
 
 #[derive(Debug, clap::Args)]

@@ -61,6 +61,10 @@ mod distortion;
 
 mod job;
 
+mod coverage;
+
+mod guess;
+
 #[cfg(test)]
 mod golden;
 
@@ -70,6 +74,8 @@ mod synthetic;
 #[cfg(test)]
 mod tests;
 
+pub use coverage::{Coverage, Tilt, coverage};
+pub use guess::guess_intrinsics;
 pub use job::{calibrate, distortion_test};
 pub use model::Model;
 pub use motion::{MeanMotion, ProjectionUncertainty};
@@ -249,8 +255,8 @@ pub struct BoardSurface {
     pub heights_m: Vec<f64>,
     /// Their standard deviations, metres.
     pub sigmas_m: Vec<f64>,
-    /// By how much the print is stretched along its rows and shrunk along its columns, and sheared: x grows by e·x + g·y,
-    /// y by g·x − e·y, about its middle. Only of a [`SurfaceKind::Free`] board.
+    /// By how much the print is stretched along its rows and shrunk along its columns, and sheared: x grows by
+    /// e·x + g·y, y by g·x − e·y, about its middle. Only of a [`SurfaceKind::Free`] board.
     pub print: Option<[Estimate; 2]>,
 }
 

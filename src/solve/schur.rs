@@ -403,8 +403,8 @@ mod tests {
     use super::*;
     use crate::solve::{Effort, minimize};
 
-    /// Curves y = aᵢ·exp(−k·t) + bᵢ + c·t² (1 + l_j at every tenth t): k and c shared, l loose, a and b of each curve its
-    /// own.
+    /// Curves y = aᵢ·exp(−k·t) + bᵢ + c·t² (1 + l_j at every tenth t): k and c shared, l loose, a and b of each curve
+    /// its own.
     struct Decays {
         precision: [f64; 2],
         /// Of three loose parameters, or none.

@@ -1,44 +1,244 @@
 //! `truedepth calibrate REC`
 
+use std::path::Path;
+
+use rayon::prelude::*;
 use truedepth::{
-    audit::{Method, Options},
-    recording::Recording,
+    board::CharucoBoard,
+    calibrate::{
+        self, FrameCorners, Input as Views, Method, Model, calibrate, coverage, guess_intrinsics,
+    },
+    detect::{Corner, Detector},
+    export::{self, Format},
+    image::Gray,
+    recording::Factory,
     report::{self, wire},
 };
 
-use super::audit::observed;
 use crate::{
-    args::{self, CalibrateArgs},
+    args::{self, CalibrateArgs, ExportFormat},
     failure::Failure,
-    input,
+    files::{Replace, write_together},
+    input::{self, Input},
     outcome::Outcome,
     terminal::Terminal,
 };
 
 pub(crate) fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome, Failure> {
-    let mut options = Options::new(match args.method {
-        args::Method::Auto => Method::Auto,
-        args::Method::Paper => Method::Paper,
-    });
-    options.board = input::board(&args.input.board)?;
-    let recording = Recording::open(&args.recording, &input::limits(&args.input))?;
-    let audit = observed(&recording, &options, terminal)?;
-    let why = audit.no_calibration.clone();
-    let Some(calibration) = wire::Audit::from(&audit).calibration else {
-        let why = why.unwrap_or_else(|| "the recording does not determine any".to_owned());
-        let message = format!("{}: no intrinsics: {why}", recording.place());
-        return Err(Failure::new(message).hint(
-            "record 20 views or more of the whole board, tilted in all directions, near and far",
-        ));
-    };
+    let format = args.export.as_deref().map(|file| format_of(file, args.format)).transpose()?;
+    let seen = look(args, terminal)?;
+    let (name, calibration) = measure(&seen, method(args, &seen))?;
+    let named = if matches!(args.method, args::Method::Paper) { "paper" } else { "auto" };
+    let document = wire::Calibration::new(&name, named, seen.factory.as_ref(), &calibration);
+    if let (Some(file), Some(format)) = (&args.export, format) {
+        write(file, format, &document, args, terminal)?;
+    }
     if args.json.json {
-        let document = wire::Document::Calibrate(Box::new(calibration));
+        let document = wire::Document::Calibrate(Box::new(document));
         terminal.result(&report::to_json(&document))?;
     } else {
-        terminal.result(&table(&calibration))?;
+        terminal.result(&table(&document))?;
+    }
+    if let Some(sigma_px) = calibration.unknown_px() {
+        let missing = coverage(&seen.views(&seen.start())).advice();
+        terminal.say(&format!(
+            "cannot tell everywhere in the image: there a point may be drawn {sigma_px:.1} px off (1 σ){}",
+            missing.map_or(String::new(), |advice| format!("; {advice}"))
+        ));
     }
     Ok(Outcome::Clean)
 }
+
+/// What was seen of the board.
+struct Seen {
+    name: String,
+    board: CharucoBoard,
+    factory: Option<Factory>,
+    size_px: [usize; 2],
+    frames: Vec<FrameCorners>,
+}
+
+impl Seen {
+    fn views<'a>(&'a self, factory: &'a truedepth::camera::Intrinsics) -> Views<'a> {
+        let tables = self.factory.as_ref().and_then(|f| f.tables.as_ref());
+        Views { board: &self.board, factory, tables, frames: &self.frames }
+    }
+
+    /// The factory's intrinsics, or a guess.
+    fn start(&self) -> truedepth::camera::Intrinsics {
+        match &self.factory {
+            Some(factory) => factory.intrinsics,
+            None => guess_intrinsics(&self.board, &self.frames, self.size_px),
+        }
+    }
+}
+
+fn method(args: &CalibrateArgs, seen: &Seen) -> Method {
+    let model = args.model.as_deref();
+    match model.and_then(|name| Model::ALL.into_iter().find(|m| m.name() == name)) {
+        Some(model) => Method::Robust(model),
+        None if matches!(args.method, args::Method::Paper) => Method::Paper,
+        None if seen.factory.is_none() => Method::Unaided,
+        None => Method::Auto,
+    }
+}
+
+/// The corners of all images, in order.
+fn look(args: &CalibrateArgs, terminal: &Terminal) -> Result<Seen, Failure> {
+    let given = input::board(&args.input.board)?;
+    let known = |own: Option<&CharucoBoard>, place: &str| {
+        given.as_ref().or(own).cloned().ok_or_else(|| {
+            Failure::new(format!("{place}: the board is not known"))
+                .hint("say which with --board, like --board 10x8:20.875mm:10.4375mm:ARUCO_ORIGINAL")
+        })
+    };
+    let place = args.recording.display().to_string();
+    match Input::at(&args.recording, &args.input)? {
+        Input::Recordings(found) => {
+            let n = found.len();
+            let mut found = found.into_iter();
+            let (Some(one), None) = (found.next(), found.next()) else {
+                let message = format!("{place} holds {n} recordings; a calibration is of one");
+                return Err(Failure::new(message).hint("name one of them"));
+            };
+            let recording = one.open()?;
+            let board = known(recording.board.as_ref(), recording.place())?;
+            let frames: Vec<usize> = (0..recording.frames.len())
+                .filter(|i| recording.frames[*i].color.is_some())
+                .collect();
+            let gray = |index: &usize| Ok(recording.gray(*index)?);
+            let (frames, size_px) = corners(&recording.name, &board, &frames, terminal, gray)?;
+            let factory = recording.factory().cloned();
+            Ok(Seen { name: recording.name.clone(), board, factory, size_px, frames })
+        }
+        Input::Images(files) => {
+            let board = known(None, &place)?;
+            let limits = input::limits(&args.input).image;
+            let gray = |index: &usize| {
+                let file = &files[*index];
+                Gray::decode(&input::read(file)?, &limits)
+                    .map_err(|e| Failure::from(e).within(format!("cannot read {}", file.display())))
+            };
+            let name =
+                args.recording.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            let all: Vec<usize> = (0..files.len()).collect();
+            let (frames, size_px) = corners(&name, &board, &all, terminal, gray)?;
+            Ok(Seen { name, board, factory: None, size_px, frames })
+        }
+    }
+}
+
+/// Decodes and searches all images; those of another size than the first are refused.
+fn corners(
+    name: &str,
+    board: &CharucoBoard,
+    frames: &[usize],
+    terminal: &Terminal,
+    gray: impl Fn(&usize) -> Result<Gray, Failure> + Sync,
+) -> Result<(Vec<FrameCorners>, [usize; 2]), Failure> {
+    let detector = Detector::new(board);
+    let bar = terminal.progress(name, frames.len());
+    let found: Vec<Result<([usize; 2], Vec<Corner>), Failure>> = frames
+        .par_iter()
+        .map(|index| {
+            let image = gray(index)?;
+            bar.inc(1);
+            Ok(([image.width(), image.height()], detector.detect(&image).corners))
+        })
+        .collect();
+    bar.finish_and_clear();
+    let mut size_px = None;
+    let mut seen = Vec::new();
+    for (frame, found) in frames.iter().zip(found) {
+        let (size, corners) = found?;
+        let first = *size_px.get_or_insert(size);
+        if size != first {
+            return Err(Failure::new(format!(
+                "{name}: images of {}x{} and of {}x{} pixels; a calibration is of one size",
+                first[0], first[1], size[0], size[1]
+            ))
+            .hint("put images of one camera and one size into a folder of their own"));
+        }
+        if !corners.is_empty() {
+            seen.push(FrameCorners { frame: *frame, corners });
+        }
+    }
+    let size_px =
+        size_px.ok_or_else(|| Failure::new(format!("{name}: there is no image in it")))?;
+    Ok((seen, size_px))
+}
+
+fn measure(seen: &Seen, method: Method) -> Result<(String, calibrate::Calibration), Failure> {
+    if seen.frames.is_empty() {
+        return Err(Failure::new(format!("{}: the board was not seen in any image", seen.name))
+            .hint("check --board with `truedepth detect`"));
+    }
+    let start = seen.start();
+    let views = seen.views(&start);
+    let calibration = calibrate(&views, method).map_err(|error| {
+        let failure = Failure::new(format!("{}: no intrinsics: cannot tell: {error}", seen.name));
+        match coverage(&views).advice() {
+            Some(advice) => failure.hint(advice),
+            None => failure,
+        }
+    })?;
+    Ok((seen.name.clone(), calibration))
+}
+
+/// A format by its name, or else by that of the file; `None` is our own.
+fn format_of(file: &Path, typed: Option<ExportFormat>) -> Result<Option<Format>, Failure> {
+    if let Some(format) = typed {
+        return Ok(match format {
+            ExportFormat::Truedepth => None,
+            ExportFormat::Opencv => Some(Format::OpenCv),
+            ExportFormat::Kalibr => Some(Format::Kalibr),
+            ExportFormat::Mrcal => Some(Format::Mrcal),
+            ExportFormat::Colmap => Some(Format::Colmap),
+            ExportFormat::Ros => Some(Format::Ros),
+            ExportFormat::Open3d => Some(Format::Open3d),
+        });
+    }
+    let extension = file.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    match extension.as_str() {
+        "json" => Ok(None),
+        "yml" | "yaml" => Ok(Some(Format::OpenCv)),
+        "cameramodel" => Ok(Some(Format::Mrcal)),
+        "txt" => Ok(Some(Format::Colmap)),
+        _ => Err(Failure::new(format!("{}: no format ends like that", file.display()))
+            .hint("end it in .yml, .cameramodel, .txt or .json, or say --format")),
+    }
+}
+
+fn write(
+    file: &Path,
+    format: Option<Format>,
+    document: &wire::Calibration,
+    args: &CalibrateArgs,
+    terminal: &Terminal,
+) -> Result<(), Failure> {
+    let text = match format {
+        None => report::to_json(&wire::Document::Calibrate(Box::new(document.clone()))),
+        Some(format) => {
+            let exported = export::calibration(&document.camera()?, &document.recording, format);
+            if let Some(residual) = exported.residual {
+                terminal.say(&format!(
+                    "{}: {} does not hold this lens; the one written differs by {:.3} px (RMS; at most {:.3} px)",
+                    file.display(),
+                    format.name(),
+                    residual.rms_px,
+                    residual.max_px
+                ));
+            }
+            exported.text
+        }
+    };
+    let replace = if args.force { Replace::WhatIsThere } else { Replace::Nothing };
+    write_together(&[(file.to_owned(), text.into_bytes())], replace)?;
+    terminal.say(&format!("calibration: {}", file.display()));
+    Ok(())
+}
+
+type Row = (&'static str, String);
 
 /// What a person wants to know, in columns.
 fn table(calibration: &wire::Calibration) -> String {
@@ -46,55 +246,135 @@ fn table(calibration: &wire::Calibration) -> String {
         ("recording", calibration.recording.clone()),
         ("model", format!("{} (--method {})", calibration.model, calibration.method)),
     ];
-    let mut focal = with_sigma(calibration.focal_px, calibration.focal_sigma_px, 2);
-    focal.push_str(" px");
-    if let (Some(factory), Some(difference)) =
-        (calibration.factory_focal_px, calibration.focal_difference_percent)
-    {
-        focal.push_str(&format!("   factory {factory:.2} px, {difference:+.2} %"));
-    }
-    rows.push(("focal length", focal));
-    let [x, y] = calibration.principal_point_px;
-    rows.push(("principal point", format!("({x:.2}, {y:.2}) px")));
-    for parameter in &calibration.parameters {
-        if !parameter.name.ends_with("_px") {
-            rows.push((
-                "",
-                format!("{} {}", parameter.name, with_sigma(parameter.value, parameter.sigma, 4)),
-            ));
-        }
-    }
+    rows.extend(camera_rows(calibration));
     rows.push((
         "fit",
         format!(
-            "rms {:.3} px over {} corners of {} views, {} outliers left out",
+            "rms {:.3} px over {} corners of {} views, {} outliers and {} frames left out",
             calibration.rms_px,
             calibration.n_corners,
             calibration.n_views,
-            calibration.outliers.len()
+            calibration.outliers.len(),
+            calibration.rejected.len(),
         ),
     ));
-    if let Some([a, b]) = calibration.split_half_focal_px {
-        rows.push(("two halves", format!("focal length {a:.2} px and {b:.2} px")));
-    }
+    rows.extend(board_row(calibration));
+    rows.extend(stability_rows(calibration));
     for (i, candidate) in calibration.candidates.iter().enumerate() {
-        let number = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.3}"));
         rows.push((
             if i == 0 { "models tried" } else { "" },
             format!(
                 "{:<18}  rms {} px, held out {} px, focal length {}",
                 candidate.model,
                 number(candidate.rms_px),
-                number(candidate.held_out_rms_px),
-                candidate.focal_px.map_or("-".to_owned(), |f| with_sigma(
-                    f,
-                    candidate.focal_sigma_px,
-                    2
-                )),
+                held_out(candidate.held_out_rms_px, candidate.held_out_sigma_px),
+                focal(candidate.focal_px, candidate.focal_sigma_px),
+            ),
+        ));
+    }
+    for (i, surface) in calibration.surfaces.iter().enumerate() {
+        rows.push((
+            if i == 0 { "boards tried" } else { "" },
+            format!(
+                "{:<18}  rms {} px, held out {} px, focal length {}",
+                surface.kind,
+                number(surface.rms_px),
+                held_out(surface.held_out_rms_px, surface.held_out_sigma_px),
+                focal(surface.focal_px, surface.focal_sigma_px),
             ),
         ));
     }
     rows.iter().map(|(name, value)| format!("{name:<16}  {value}\n")).collect()
+}
+
+fn camera_rows(calibration: &wire::Calibration) -> Vec<Row> {
+    let mut focal = with_sigma(calibration.focal_px, calibration.focal_sigma_px, 2);
+    focal.push_str(" px");
+    let [fx, fy] = calibration.focal_xy_px;
+    if fx != fy {
+        focal.push_str(&format!(" (fx {fx:.2}, fy {fy:.2})"));
+    }
+    if let (Some(factory), Some(difference)) =
+        (calibration.factory_focal_px, calibration.focal_difference_percent)
+    {
+        focal.push_str(&format!("   factory {factory:.2} px, {difference:+.2} %"));
+    }
+    let sigma_of =
+        |name: &str| calibration.parameters.iter().find(|p| p.name == name).and_then(|p| p.sigma);
+    let [x, y] = calibration.principal_point_px;
+    let center = [(x, "center_x_px"), (y, "center_y_px")]
+        .map(|(value, name)| with_sigma(value, sigma_of(name), 2));
+    let mut rows = vec![
+        ("focal length", focal),
+        ("principal point", format!("({}, {}) px", center[0], center[1])),
+    ];
+    for parameter in &calibration.parameters {
+        if !parameter.name.ends_with("_px") {
+            let value = with_sigma(parameter.value, parameter.sigma, 4);
+            rows.push(("", format!("{} {value}", parameter.name)));
+        }
+    }
+    rows
+}
+
+fn board_row(calibration: &wire::Calibration) -> Option<Row> {
+    let surface = calibration.board_surface.as_ref()?;
+    let mut text = format!(
+        "not flat ({}): {} mm from its highest to its lowest corner",
+        surface.kind,
+        with_sigma(surface.peak_to_valley_mm?, surface.peak_to_valley_sigma_mm, 3)
+    );
+    if let (Some(stretch), Some(shear)) = (surface.print_stretch, surface.print_shear) {
+        let percent =
+            |value: f64, sigma: Option<f64>| with_sigma(100.0 * value, sigma.map(|s| 100.0 * s), 3);
+        text.push_str(&format!(
+            "; print stretched by {} %, sheared by {} %",
+            percent(stretch, surface.print_stretch_sigma),
+            percent(shear, surface.print_shear_sigma),
+        ));
+    }
+    Some(("board", text))
+}
+
+fn stability_rows(calibration: &wire::Calibration) -> Vec<Row> {
+    let mut rows = Vec::new();
+    if let Some([a, b]) = calibration.split_half_focal_px {
+        let [sigma_a, sigma_b] = calibration.split_half_focal_sigma_px.unwrap_or([None, None]);
+        let [a, b] = [with_sigma(a, sigma_a, 2), with_sigma(b, sigma_b, 2)];
+        rows.push(("two halves", format!("focal length {a} px and {b} px")));
+    }
+    let without: Vec<f64> = calibration.left_out.iter().filter_map(|l| l.focal_px).collect();
+    if let (Some(low), Some(high)) =
+        (without.iter().copied().reduce(f64::min), without.iter().copied().reduce(f64::max))
+    {
+        rows.push(("each left out", format!("focal length {low:.2} to {high:.2} px")));
+    }
+    if let Some(grid) = &calibration.projection_uncertainty {
+        let sigmas: Vec<f64> = grid.sigma_px.iter().copied().flatten().collect();
+        let at = |index: usize| grid.sigma_px.get(index).copied().flatten().unwrap_or(f64::NAN);
+        rows.push((
+            "projection",
+            format!(
+                "± {:.2} px in the middle, ± {:.2} px at worst, for points {:.2} m away",
+                at(grid.sigma_px.len() / 2),
+                sigmas.iter().copied().fold(0.0, f64::max),
+                grid.depth_m
+            ),
+        ));
+    }
+    rows
+}
+
+fn number(value: Option<f64>) -> String {
+    value.map_or("-".to_owned(), |v| format!("{v:.3}"))
+}
+
+fn held_out(value: Option<f64>, sigma: Option<f64>) -> String {
+    value.map_or("-".to_owned(), |v| with_sigma(v, sigma, 3))
+}
+
+fn focal(value: Option<f64>, sigma: Option<f64>) -> String {
+    value.map_or("-".to_owned(), |f| with_sigma(f, sigma, 2))
 }
 
 fn with_sigma(value: f64, sigma: Option<f64>, decimals: usize) -> String {
