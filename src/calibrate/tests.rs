@@ -1,12 +1,13 @@
 //! The whole room on corners of known cameras.
 
 use super::{
-    Calibration, Error, Estimate, FrameCorners, Input, Lens, Method, Model, Rejection, calibrate,
+    Calibration, Error, Estimate, FrameCorners, Input, Lens, Method, Model, ProjectionUncertainty,
+    Rejection, SurfaceKind, calibrate, coverage, guess_intrinsics,
     synthetic::{FACTORY, Random, Scene, board, pose, tables},
 };
 use crate::{
-    camera::{Brown, Distortion, TablePair},
-    solve::mean,
+    camera::{Brown, Distortion, Intrinsics, TablePair},
+    solve::{mean, rms},
 };
 
 fn run(
@@ -237,4 +238,149 @@ fn selects_as_the_paper() {
     let pinhole = found.camera.intrinsics;
     assert_eq!((pinhole.cx, pinhole.cy, pinhole.fx), (FACTORY.cx, FACTORY.cy, pinhole.fy));
     assert!(found.outliers.is_empty() && found.distortion.is_none());
+}
+
+/// The board's height at each corner less the best plane, for a wave of [`Scene::see`].
+fn true_heights_m(wave: [f64; 4], wave_m: f64) -> Vec<f64> {
+    let board = board();
+    let places: Vec<[f64; 2]> = (0..board.n_corners())
+        .map(|id| [board.corner(id).x() / 0.104 - 1.0, board.corner(id).y() / 0.0835 - 1.0])
+        .collect();
+    let form = |[s, t]: [f64; 2]| {
+        wave_m * (wave[0] * s * s + wave[1] * t * t + wave[2] * s * t + wave[3] * s * s * s)
+    };
+    let heights: Vec<f64> = places.iter().map(|p| form(*p)).collect();
+    // The corners are a grid about nearly (0, 0): the plane's three parts are all but independent.
+    let n = places.len() as f64;
+    let about = |axis: usize| places.iter().map(|p| p[axis]).sum::<f64>() / n;
+    let middle = [about(0), about(1)];
+    let slope = |axis: usize| {
+        let along = |p: &[f64; 2]| p[axis] - middle[axis];
+        let sum: f64 = places.iter().zip(&heights).map(|(p, h)| along(p) * h).sum();
+        sum / places.iter().map(|p| along(p).powi(2)).sum::<f64>()
+    };
+    let (mean, slopes) = (mean(&heights), [slope(0), slope(1)]);
+    let plane =
+        |p: &[f64; 2]| mean + slopes[0] * (p[0] - middle[0]) + slopes[1] * (p[1] - middle[1]);
+    places.iter().zip(&heights).map(|(p, h)| h - plane(p)).collect()
+}
+
+/// Twenty views of a board of this form.
+fn views_of(wave: [f64; 4], wave_m: f64, seed: u64) -> Vec<FrameCorners> {
+    let scene = Scene { wave_m, noise_px: 0.05, ..Scene::new(Distortion::None) };
+    let mut random = Random(seed);
+    (0..20)
+        .map(|frame| {
+            let azimuth = random.uniform(0.0, 6.28);
+            let at = [(-0.03, 0.03), (-0.03, 0.03), (0.2, 0.35)]
+                .map(|(low, high)| random.uniform(low, high));
+            let pose = pose(random.uniform(0.2, 0.7), azimuth, random.uniform(-1.0, 1.0), at);
+            FrameCorners { frame, corners: scene.see(&pose, wave, &mut random) }
+        })
+        .collect()
+}
+
+/// The simplest shape that explains the board is chosen, and is the true one within its σ.
+#[test]
+fn finds_the_shape_of_the_board() {
+    let cases = [
+        ([0.0; 4], SurfaceKind::Flat),
+        ([1.0, -0.5, 0.0, 0.0], SurfaceKind::Bend),
+        ([0.6, 0.3, -0.7, 0.8], SurfaceKind::Free),
+    ];
+    for (wave, kind) in cases {
+        let frames = views_of(wave, 5e-4, 7);
+        let found = run(&frames, None, Method::Robust(Model::FocalCentre)).unwrap();
+        assert_eq!(found.surfaces.len(), 3);
+        assert_eq!(found.surface.as_ref().map_or(SurfaceKind::Flat, |s| s.kind), kind);
+        assert!(found.rms_px < 0.075, "√2·0.05 is all that is left: {}", found.rms_px);
+        let truth = true_heights_m(wave, 5e-4);
+        let Some(surface) = found.surface else { continue };
+        let off: Vec<f64> = (0..truth.len())
+            .map(|id| (surface.heights_m[id] - truth[id]) / surface.sigmas_m[id])
+            .collect();
+        assert!(rms(&off) > 0.3 && rms(&off) < 1.6, "{kind:?}: {}", rms(&off));
+        assert!(surface.sigmas_m.iter().all(|s| *s < 3e-5), "{kind:?}");
+        let range = |h: &[f64]| {
+            let fold = |f: fn(f64, f64) -> f64| h.iter().copied().reduce(f).unwrap();
+            fold(f64::max) - fold(f64::min)
+        };
+        let size = surface.size_m();
+        assert!((size.value - range(&truth)).abs() < 4.0 * size.sigma, "{size:?}");
+    }
+}
+
+/// Nothing known of the camera: a guess to start from, and fx ≠ fy found.
+#[test]
+fn a_camera_of_which_nothing_is_known() {
+    let mut scene = Scene { n_views: 20, ..Scene::new(Distortion::None) };
+    let lens = Brown { k1: 0.05, k2: -0.04, ..Brown::ZERO };
+    scene.camera.distortion = Distortion::Brown(lens);
+    scene.camera.intrinsics = Intrinsics { fx: 620.0, fy: 626.0, cx: 310.0, ..FACTORY };
+    let frames = scene.frames(3);
+    let guess = guess_intrinsics(&board(), &frames, [640, 480]);
+    assert!((guess.fx / 620.0 - 1.0).abs() < 0.1, "{guess:?}");
+    let input = Input { board: &board(), factory: &guess, tables: None, frames: &frames };
+    let found = calibrate(&input, Method::Unaided).unwrap();
+    assert_eq!(found.model, Model::BrownAspect);
+    assert!(normalised(found.focal_px(), 620.0).abs() < 4.0);
+    assert!(normalised(found.parameter("aspect").unwrap(), 626.0 / 620.0).abs() < 4.0);
+    assert!(normalised(found.parameter("center_x_px").unwrap(), 310.0).abs() < 4.0);
+    // Nothing to go by is no error: the larger side of the image.
+    assert_eq!(guess_intrinsics(&board(), &[], [1280, 720]).fx, 1280.0);
+}
+
+/// Which views are missing, and where in the image.
+#[test]
+fn says_what_is_missing() {
+    let scene = Scene { n_views: 8, tilt_rad: [0.0, 0.01], ..Scene::new(Distortion::None) };
+    let frames = scene.frames(3);
+    let input = Input { board: &board(), factory: &FACTORY, tables: None, frames: &frames };
+    let straight = coverage(&input);
+    assert_eq!(straight.missing_tilts().len(), 4);
+    assert!(straight.advice().unwrap().contains("tilted by 20° to 45° to all sides"));
+    // Always the same side nearest, and never the left of the image.
+    let mut random = Random(9);
+    let frames: Vec<FrameCorners> = (0..8)
+        .map(|frame| {
+            // About an axis upwards in the image: the right side comes nearer.
+            let tilt = random.uniform(0.4, 0.6);
+            let pose = pose(tilt, std::f64::consts::FRAC_PI_2, 0.0, [0.13, 0.0, 0.4 + 0.02 * tilt]);
+            FrameCorners { frame, corners: scene.see(&pose, [0.0; 4], &mut random) }
+        })
+        .collect();
+    let one_side = coverage(&Input { frames: &frames, ..input });
+    assert_eq!(one_side.missing_tilts(), ["bottom", "left", "top"], "{one_side:?}");
+    assert!(one_side.missing_places().contains(&"left"), "{one_side:?}");
+    assert_eq!(
+        one_side.n_corners.iter().sum::<usize>(),
+        frames.iter().map(|f| f.corners.len()).sum::<usize>()
+    );
+}
+
+/// The more the views leave open, the more a wrong calibration may cost; and it says where.
+#[test]
+fn projection_is_least_known_where_nothing_was_seen() {
+    let scene = Scene::new(Distortion::None);
+    let whole = run(&scene.frames(6), None, Method::Robust(Model::Brown)).unwrap();
+    let mut frames = scene.frames(6);
+    for frame in &mut frames {
+        frame.corners.retain(|c| c.pixel.x < 420.0 && c.pixel.y < 330.0);
+    }
+    let part = run(&frames, None, Method::Robust(Model::Brown)).unwrap();
+    let grid = |found: &Calibration| found.projection_uncertainty(5, 5, 0.3).unwrap();
+    let (whole_grid, part_grid) = (grid(&whole), grid(&part));
+    assert_eq!(part_grid.sigma_px.len(), 25);
+    let far = |grid: &ProjectionUncertainty| grid.sigma_px[24];
+    assert!(far(&part_grid) > 4.0 * far(&whole_grid), "{part_grid:?} {whole_grid:?}");
+    assert!(far(&part_grid) > 4.0 * part_grid.sigma_px[6], "{part_grid:?}");
+    assert!(part.unknown_px().is_some());
+    let mm = 1e3 * 0.3 / whole.camera.intrinsics.focal_px();
+    assert!((whole_grid.sigma_mm[3] / whole_grid.sigma_px[3] - mm).abs() < 1e-12);
+    assert!(whole.projection_uncertainty(1, 5, 0.3).is_none());
+    assert!(whole.projection_uncertainty(5, 5, 0.0).is_none());
+    // Without each picture the focal length moves by less than a few of its σ.
+    let focal = whole.focal_px();
+    assert_eq!(whole.left_out.len(), whole.n_pictures);
+    assert!(whole.left_out.iter().all(|l| (l.focal_px - focal.value).abs() < 3.0 * focal.sigma));
 }

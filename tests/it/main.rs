@@ -2,6 +2,7 @@
 //!
 //! Tests on real recordings ask [`data`] for them and end early, saying so, where the folder is absent.
 
+mod calibrate;
 mod coverage;
 mod detect;
 mod photos;
