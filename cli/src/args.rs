@@ -352,8 +352,14 @@ pub(crate) struct CalibrateArgs {
     pub(crate) method: Method,
 
     /// Fit this camera model instead of the one that predicts held-out views best
-    #[arg(long, value_name = "MODEL", conflicts_with = "method", value_parser = PossibleValuesParser::new(Model::ALL.map(Model::name)))]
+    #[arg(long, value_name = "MODEL", conflicts_with = "method", value_parser = models())]
     pub(crate) model: Option<String>,
+
+    /// Fit --model as OpenCV's calibrateCamera does: all corners alike, none left out, the board taken for flat
+    ///
+    /// To compare, not to use: boards are not flat, and prints not true to scale.
+    #[arg(long, requires = "model")]
+    pub(crate) plain: bool,
 
     #[command(flatten)]
     pub(crate) input: InputArgs,
@@ -376,6 +382,10 @@ pub(crate) struct CalibrateArgs {
     /// Replace the file of --export where it is there already
     #[arg(long, requires = "export")]
     pub(crate) force: bool,
+}
+
+fn models() -> PossibleValuesParser {
+    PossibleValuesParser::new(Model::ALL.map(Model::name))
 }
 
 /// Whose file is written.

@@ -3,14 +3,17 @@
 use super::{
     Estimate,
     model::Shape,
-    motion::MeanMotion,
+    motion::{Joint, MeanMotion},
     problem::{Measured, Reprojection},
     surface::{Form, Sheet},
 };
 use crate::{
     camera::Intrinsics,
     geom::{Board, Color, Pose},
-    solve::{Arrow, ArrowNormal, BySchur, Effort, Loss, Pooled, Reduced, larger, minimize, total},
+    solve::{
+        Arrow, ArrowNormal, BySchur, DenseCholesky, Effort, Loss, Pooled, Reduced, larger,
+        minimize, total,
+    },
 };
 
 /// What a fit is made from.
@@ -72,6 +75,8 @@ pub(super) struct Fit {
     pub(super) held_out: Vec<f64>,
     /// For each picture the focal length that all others have, pixels; `None` where these do not determine it.
     pub(super) left_out_focal_px: Vec<Option<f64>>,
+    /// What becomes of the fit where views may move while their rows are read; only where [`Wanted::Everything`] was.
+    pub(super) shutter: Option<Shutter>,
     /// How the poses go with the camera; only where [`Wanted::Everything`] was.
     pub(super) motion: Option<MeanMotion>,
 }
@@ -99,6 +104,19 @@ impl Fit {
         Start { free: &self.free, heights_m: &self.heights_m, poses: &self.poses }
     }
 }
+
+/// The same fit with a velocity for each view, one step of the normal equations away.
+#[derive(Clone, Debug)]
+pub(super) struct Shutter {
+    /// The residuals' standard deviation as a share of what it is without.
+    pub(super) share: f64,
+    /// By how much `free` and after these `heights_m` move.
+    pub(super) shift: Vec<f64>,
+}
+
+/// Velocities that leave more than this share of the residuals' standard deviation explain nothing: without a rolling
+/// shutter it stays near one, since the degrees of freedom are counted.
+const MOVING_SHARE: f64 = 0.8;
 
 /// The least-squares fit of `shape` from `start`. `None` where the start does not project, or there are fewer residuals
 /// than parameters.
@@ -166,6 +184,17 @@ fn fit_sized<const S: usize>(shape: Shape<'_>, data: &Data<'_>, start: Start<'_>
             None => classical,
         }
     });
+    let shutter = (data.wanted == Wanted::Everything)
+        .then(|| shutter(&problem, &minimum.normal, (&shared, &loose), &poses))
+        .flatten();
+    let covariance = covariance.map(|covariance| match &shutter {
+        Some(shutter) if shutter.share < MOVING_SHARE => {
+            let with_shift = |(i, shift): (usize, &f64)| covariance[i * n + i] + shift * shift;
+            let variances: Vec<f64> = shutter.shift.iter().enumerate().map(with_shift).collect();
+            larger(&covariance, &variances)
+        }
+        _ => covariance,
+    });
     let left_out = match &pooled {
         Some(pooled) => pooled.leave_one_out(),
         None => vec![None; data.n_pictures()],
@@ -175,10 +204,12 @@ fn fit_sized<const S: usize>(shape: Shape<'_>, data: &Data<'_>, start: Start<'_>
     }
     let left_out_focal_px =
         left_out.iter().map(|l| l.as_ref().map(|l| shared[0] + l.shift[0])).collect();
-    let motion = covariance
-        .as_ref()
-        .filter(|_| data.wanted == Wanted::Everything)
-        .and_then(|c| mean_motion(&minimum.normal, &poses, c, (variance, shape.n_camera(&shared))));
+    let motion =
+        covariance.as_ref().filter(|_| data.wanted == Wanted::Everything).and_then(|covariance| {
+            let planes = data.sheet.plane_steps(shape.surface);
+            let joint = Joint { covariance, variance, n_camera: shape.n_camera(&shared) };
+            mean_motion(&minimum.normal, &poses, &planes, &joint)
+        });
     Some(Fit {
         free: shared.to_vec(),
         heights_m: loose,
@@ -186,6 +217,7 @@ fn fit_sized<const S: usize>(shape: Shape<'_>, data: &Data<'_>, start: Start<'_>
         covariance,
         held_out,
         left_out_focal_px,
+        shutter,
         motion,
     })
 }
@@ -203,15 +235,46 @@ fn is_determined<const S: usize>(pooled: &Pooled<'_>, diagonal: &[f64; S], n: us
     })
 }
 
+/// Would velocities explain the residuals, and what would they change? `None` where the views do not determine them.
+fn shutter<const S: usize>(
+    problem: &Reprojection<'_, S>,
+    normal: &ArrowNormal<S, 6>,
+    (shared, heights_m): (&[f64; S], &[f64]),
+    poses: &[Pose<Color, Board>],
+) -> Option<Shutter> {
+    let mut all = normal.prior.clone();
+    let (mut gain, mut cost, mut n_residuals) = (0.0, 0.0, 0);
+    for (index, pose) in poses.iter().enumerate() {
+        let block = problem.moving_view(index, (shared, heights_m), pose)?;
+        gain += block.block_gain()?;
+        cost += 2.0 * block.cost();
+        n_residuals += 2 * problem.views[index].corners.len();
+        if !block.reduce_into(&mut all) {
+            return None;
+        }
+    }
+    let shift = DenseCholesky::new(all.information.clone(), all.n())?.solve(&all.score);
+    gain += shift.iter().zip(&all.score).map(|(step, score)| step * score).sum::<f64>();
+    let degrees = |per_view: usize| {
+        n_residuals
+            .checked_sub(all.n() + per_view * poses.len())
+            .filter(|d| *d > 0)
+            .map(|d| d as f64)
+    };
+    let still = cost / degrees(6)?;
+    let moving = (cost - gain).max(0.0) / degrees(12)?;
+    Some(Shutter { share: (moving / still).sqrt(), shift })
+}
+
 fn mean_motion<const S: usize>(
     normal: &ArrowNormal<S, 6>,
     poses: &[Pose<Color, Board>],
-    covariance: &[f64],
-    (variance, n_camera): (f64, usize),
+    planes: &[[f64; 6]],
+    joint: &Joint<'_>,
 ) -> Option<MeanMotion> {
-    let n = covariance.len().isqrt();
+    let n = joint.covariance.len().isqrt();
     let responses: Option<Vec<_>> = normal.blocks.iter().map(|b| b.block_response(n)).collect();
-    Some(MeanMotion::new(&responses?, poses, covariance, (variance, n_camera)))
+    Some(MeanMotion::new(responses?, poses, planes, joint))
 }
 
 #[cfg(test)]

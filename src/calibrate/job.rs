@@ -1,11 +1,11 @@
 //! The calibration itself.
 
 use super::{
-    Calibration, Candidate, DistortionTest, Error, Input, LeftOutPicture, Method, Model, Parameter,
+    Calibration, Candidate, DistortionTest, Error, Input, LeftOutPicture, Method, Model, Parameter, RollingShutter,
     auto::{self, MAX_FOCAL_SIGMA, MIN_PICTURES, Prepared},
     distortion,
     fit::{Data, Fit, Start, Wanted, fit},
-    model::Shape,
+    model::{Center, Shape},
     problem::Measured,
     surface::{Form, Sheet, Surface},
     views,
@@ -205,9 +205,15 @@ fn assemble(
         candidates,
         split_half_focal_px: None,
         distortion: None,
-        surface: prepared.sheet.surface(input.board, shape.surface, &form, whole),
+        surface: prepared.sheet.surface(shape.surface, &form, whole),
         surfaces: prepared.surfaces,
         left_out: left_out(&prepared.views, &prepared.pictures, &fit.left_out_focal_px),
+        rolling_shutter: fit.shutter.as_ref().map(|shutter| RollingShutter {
+            residual_share: shutter.share,
+            focal_shift_px: shutter.shift[0],
+            center_shift_px: (shape.center == Center::Free)
+                .then(|| [shutter.shift[1], shutter.shift[2]]),
+        }),
         motion: fit.motion.clone(),
         outliers: prepared.outliers,
         rejected: prepared.rejected,

@@ -7,9 +7,10 @@
 //!
 //! Every σ is the larger of two: the classical one (independent corner noise, its size taken from the residuals) and
 //! one that lets residuals of the same picture be correlated in any way, as those of a board that is not quite flat
-//! are ([`solve::clustered`](crate::solve::clustered)). What is wrong the same way in *every* picture neither of them
-//! sees; the shape of the board is that, and is therefore estimated with the camera ([`BoardSurface`]) where held-out
-//! pictures ask for it.
+//! are ([`Pooled::clustered`](crate::solve::Pooled::clustered)). What is wrong the same way in *every* picture neither of them
+//! sees; a rolling shutter under a hand that moves is nearly that, and enlarges σ where the residuals show it
+//! ([`RollingShutter`]); the shape of the board is that, and is therefore estimated with the
+//! camera ([`BoardSurface`]) where held-out pictures ask for it.
 //!
 //! ```
 //! use truedepth::board::CharucoBoard;
@@ -163,6 +164,9 @@ pub struct Calibration {
     pub surfaces: Vec<SurfaceCandidate>,
     /// The focal length without each picture, by frame.
     pub left_out: Vec<LeftOutPicture>,
+    /// Whether the views moved while the rows of their images were read, and what that may have done; `None` where the
+    /// views do not tell.
+    pub rolling_shutter: Option<RollingShutter>,
     /// How the poses go with the camera: what [`projection_uncertainty`](Self::projection_uncertainty) needs; `None`
     /// in a calibration that was not made here.
     pub motion: Option<MeanMotion>,
@@ -244,6 +248,22 @@ pub struct LeftOutPicture {
     pub frames: Vec<usize>,
     /// The focal length that all others have, pixels (to second order: one step of the normal equations).
     pub focal_px: f64,
+}
+
+/// What is left of the residuals where each view may turn and shift while the rows of its image are read, one after
+/// the other: to first order, with 4 mrad and 1 mm known beforehand. (Hand-held cameras with a rolling shutter do.)
+///
+/// The calibration does not correct for it: most of what it does differs from view to view and averages out. But where
+/// the residuals fall to less than 0.8 of what they were, what the intrinsics would change by is added to their σ.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RollingShutter {
+    /// The residuals' standard deviation with motion as a share of that without; degrees of freedom are counted, so
+    /// that it is near one where nothing moves.
+    pub residual_share: f64,
+    /// What the focal length would change by, pixels.
+    pub focal_shift_px: f64,
+    /// What the principal point would change by, pixels; where the model frees it.
+    pub center_shift_px: Option<[f64; 2]>,
 }
 
 /// How a board deviates from a flat one, estimated with the camera.

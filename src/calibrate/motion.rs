@@ -21,23 +21,41 @@ pub struct MeanMotion {
     n_camera: usize,
 }
 
+/// The covariance of all shared numbers.
+pub(super) struct Joint<'a> {
+    /// Row-major, the camera's first, the surface's last.
+    pub(super) covariance: &'a [f64],
+    /// Of a residual of unit weight.
+    pub(super) variance: f64,
+    pub(super) n_camera: usize,
+}
+
 impl MeanMotion {
     /// From each pose's own covariance for unit variance and how it follows the other numbers, and the covariance of
-    /// these (the camera's first).
+    /// these; `planes` is how the board's own plane moves with each of the surface's numbers.
+    ///
+    /// A board whose heights all rise by a millimetre and whose poses all sink by as much is the same board: where it
+    /// stands is where its own plane does.
     ///
     /// A step (ω, τ) of a pose moves a point p of the camera's frame by ω × (p − t) + τ = ω × p + (τ − ω × t).
     pub(super) fn new(
-        responses: &[([[f64; 6]; 6], Vec<[f64; 6]>)],
+        responses: Vec<([[f64; 6]; 6], Vec<[f64; 6]>)>,
         poses: &[Pose<Color, Board>],
-        covariance: &[f64],
-        (variance, n_camera): (f64, usize),
+        planes: &[[f64; 6]],
+        &Joint { covariance, variance, n_camera }: &Joint<'_>,
     ) -> Self {
         let n = covariance.len().isqrt();
         let share = 1.0 / poses.len() as f64;
         let mut follows = vec![[0.0; 6]; n];
         let mut own = [[0.0; 6]; 6];
-        for ((pose_covariance, response), pose) in responses.iter().zip(poses) {
-            for (sum, step) in follows.iter_mut().zip(response) {
+        for ((pose_covariance, mut response), pose) in responses.into_iter().zip(poses) {
+            for (step, plane) in response[n - planes.len()..].iter_mut().zip(planes) {
+                let turn = pose.rotation * Vector3::new(plane[0], plane[1], plane[2]);
+                let shift = pose.rotation * Vector3::new(plane[3], plane[4], plane[5]);
+                let moved = [turn.x, turn.y, turn.z, shift.x, shift.y, shift.z];
+                (0..6).for_each(|k| step[k] += moved[k]);
+            }
+            for (sum, step) in follows.iter_mut().zip(&response) {
                 let moved = about_camera(pose, step);
                 (0..6).for_each(|k| sum[k] += share * moved[k]);
             }

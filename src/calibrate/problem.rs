@@ -162,16 +162,21 @@ impl Ready<'_> {
     }
 }
 
-impl<const S: usize> Bordered<S, 6> for Reprojection<'_, S> {
-    type Block = Pose<Color, Board>;
+/// How far a view may turn (radians) and shift (metres) while the rows of its image are read: a hand leads a camera by
+/// a quarter of a radian and some centimetres a second, and reading takes some ten milliseconds.
+const MOTION_SIGMA: [f64; 6] = [4e-3, 4e-3, 4e-3, 1e-3, 1e-3, 1e-3];
 
-    fn linearize_block(
+impl<const S: usize> Reprojection<'_, S> {
+    /// Adds all residuals of a view; `own` takes the derivatives by the pose, and the time at which the corner's row is
+    /// read (from −½ at the top to ½ at the bottom of the image), to those by the block's parameters.
+    #[inline]
+    fn add_view<const B: usize>(
         &self,
         index: usize,
-        shared: &[f64; S],
-        heights_m: &[f64],
-        pose: &Self::Block,
-        normal: &mut BlockNormal<S, 6>,
+        (shared, heights_m): (&[f64; S], &[f64]),
+        pose: &Pose<Color, Board>,
+        normal: &mut BlockNormal<S, B>,
+        own: impl Fn(&[f64; 6], f64) -> [f64; B],
     ) -> bool {
         if !(shared[0] > 0.0) {
             return false;
@@ -183,6 +188,7 @@ impl<const S: usize> Bordered<S, 6> for Reprojection<'_, S> {
         let surface = self.shape.surface;
         let numbers = self.shape.surface_numbers(shared);
         let first = S - numbers.len();
+        let rows = self.factory.height as f64;
         for (index, corner) in view.corners.iter().enumerate() {
             let point = &view.points[index];
             let place = self.sheet.lifted(surface, (corner.id, point), (numbers, heights_m));
@@ -194,6 +200,7 @@ impl<const S: usize> Bordered<S, 6> for Reprojection<'_, S> {
             let [dx, dy] = [corner.pixel.x - drawn.pixel[0], corner.pixel.y - drawn.pixel[1]];
             let square = view.weights[index] * (dx * dx + dy * dy);
             let weight = view.weights[index] * self.loss.weight(square);
+            let time = (corner.pixel.y + 0.5) / rows - 0.5;
             normal.add_cost(0.5 * self.loss.rho(square));
             for (residual, row) in [(dx, 0), (dy, 1)] {
                 let by_point = drawn.by_point[row];
@@ -203,15 +210,50 @@ impl<const S: usize> Bordered<S, 6> for Reprojection<'_, S> {
                 for (derivative, by) in by_shared[first..].iter_mut().zip(&by_surface) {
                     *derivative = along(by);
                 }
-                let by_pose = pose::d_pixel_d_pose(by_point, &turned);
-                normal.add_row(weight, residual, by_shared, &by_pose);
+                let by_own = own(&pose::d_pixel_d_pose(by_point, &turned), time);
+                normal.add_row(weight, residual, by_shared, &by_own);
                 if !heights_m.is_empty() {
                     let by_height = (corner.id, along(&normal_axis));
-                    normal.add_loose((weight, residual), (by_shared, &by_pose), by_height);
+                    normal.add_loose((weight, residual), (by_shared, &by_own), by_height);
                 }
             }
         }
         true
+    }
+
+    /// The normal equations of a view that moves while its rows are read: its pose, and by how much it turns and shifts
+    /// from the first row to the last; `None` outside the problem's domain.
+    pub(super) fn moving_view(
+        &self,
+        index: usize,
+        numbers: (&[f64; S], &[f64]),
+        pose: &Pose<Color, Board>,
+    ) -> Option<BlockNormal<S, 12>> {
+        let mut normal = BlockNormal::ZERO;
+        let whole = self.add_view(index, numbers, pose, &mut normal, |by_pose, time| {
+            std::array::from_fn(|k| if k < 6 { by_pose[k] } else { time * by_pose[k - 6] })
+        });
+        for (k, sigma) in MOTION_SIGMA.into_iter().enumerate() {
+            let mut unit = [0.0; 12];
+            unit[6 + k] = 1.0;
+            normal.add_row(sigma.powi(-2), 0.0, &[0.0; S], &unit);
+        }
+        whole.then_some(normal)
+    }
+}
+
+impl<const S: usize> Bordered<S, 6> for Reprojection<'_, S> {
+    type Block = Pose<Color, Board>;
+
+    fn linearize_block(
+        &self,
+        index: usize,
+        shared: &[f64; S],
+        heights_m: &[f64],
+        pose: &Self::Block,
+        normal: &mut BlockNormal<S, 6>,
+    ) -> bool {
+        self.add_view(index, (shared, heights_m), pose, normal, |by_pose, _| *by_pose)
     }
 
     fn shared_precision(&self) -> [f64; S] {

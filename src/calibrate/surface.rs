@@ -66,7 +66,7 @@ pub(super) struct Sheet {
     sigma_m: f64,
     /// The inverse covariance of the heights, row-major.
     precision: Vec<f64>,
-    pub(super) n_corners: usize,
+    corners: Vec<Vector3<f64>>,
 }
 
 impl Sheet {
@@ -76,9 +76,10 @@ impl Sheet {
         let half = [board.squares_x, board.squares_y].map(|n| 0.5 * n as f64 * board.square_m);
         let sigma_m = SIGMA_SHARE * 2.0 * half[0].max(half[1]);
         let n = board.n_corners();
-        let mut sheet = Self { center: half, half, sigma_m, precision: Vec::new(), n_corners: n };
+        let corners: Vec<Vector3<f64>> = (0..n).map(|id| board.corner(id).coords).collect();
+        let mut sheet = Self { center: half, half, sigma_m, precision: Vec::new(), corners };
         if n <= MAX_FREE_CORNERS {
-            let corners: Vec<Vector3<f64>> = (0..n).map(|id| board.corner(id).coords).collect();
+            let corners = &sheet.corners;
             let scale = 3.0_f64.sqrt() / (SMOOTH_SQUARES * board.square_m);
             let covariance = (0..n * n)
                 .map(|at| {
@@ -105,7 +106,7 @@ impl Sheet {
 
     /// How many heights are free.
     pub(super) fn n_heights(&self, surface: Surface) -> usize {
-        if surface == Surface::Free { self.n_corners } else { 0 }
+        if surface == Surface::Free { self.corners.len() } else { 0 }
     }
 
     /// The precision (1/σ²) of each of the shared numbers beforehand.
@@ -149,11 +150,31 @@ impl Sheet {
         Point::from_coords(place)
     }
 
+    /// The height of all corners by each of the surface's numbers.
+    fn by_numbers(&self, surface: Surface) -> impl Iterator<Item = Vec<f64>> {
+        let shared = (0..surface.n_shared()).map(move |k| {
+            self.corners.iter().map(|corner| self.by_shared(surface, corner)[k].z).collect()
+        });
+        let heights = (0..self.n_heights(surface))
+            .map(|k| (0..self.corners.len()).map(|id| f64::from(u8::from(k == id))).collect());
+        shared.chain(heights)
+    }
+
+    /// How the board's own plane (the best one through its corners) moves with each of the surface's numbers, as a step
+    /// (ω, τ) of a pose in the board's frame: radians, metres.
+    pub(super) fn plane_steps(&self, surface: Surface) -> Vec<[f64; 6]> {
+        self.by_numbers(surface)
+            .map(|column| {
+                let plane = best_plane(&self.corners, &column);
+                [plane.z, -plane.y, 0.0, 0.0, 0.0, plane.x]
+            })
+            .collect()
+    }
+
     /// The board's shape, from its numbers and the covariance of all free numbers (row-major, the surface's last);
     /// `None` for a flat board.
     pub(super) fn surface(
         &self,
-        board: &CharucoBoard,
         surface: Surface,
         form: &Form,
         covariance: &[f64],
@@ -161,19 +182,17 @@ impl Sheet {
         if surface == Surface::Flat {
             return None;
         }
-        let corners: Vec<Vector3<f64>> =
-            (0..board.n_corners()).map(|id| board.corner(id).coords).collect();
+        let corners = &self.corners;
         // The height of each corner by each number of the surface, the best plane taken out: the poses have it.
-        let n_numbers = form.shared.len() + form.heights_m.len();
-        let columns: Vec<Vec<f64>> = (0..n_numbers)
-            .map(|k| {
-                let raw = corners.iter().enumerate().map(|(id, corner)| match surface {
-                    Surface::Bend => self.by_shared(surface, corner)[k].z,
-                    _ => f64::from(u8::from(k == form.shared.len() + id)),
-                });
-                without_plane(&corners, raw.collect())
+        let columns: Vec<Vec<f64>> = self
+            .by_numbers(surface)
+            .map(|column| {
+                let plane = best_plane(corners, &column);
+                let flat = |p: &Vector3<f64>| plane.x + plane.y * p.x + plane.z * p.y;
+                corners.iter().zip(column).map(|(place, height)| height - flat(place)).collect()
             })
             .collect();
+        let n_numbers = columns.len();
         let n = covariance.len().isqrt();
         let first = n - n_numbers;
         let numbers: Vec<f64> = form.shared.iter().chain(&form.heights_m).copied().collect();
@@ -199,16 +218,13 @@ impl Sheet {
     }
 }
 
-/// Values at places, less their best plane.
-fn without_plane(places: &[Vector3<f64>], values: Vec<f64>) -> Vec<f64> {
+/// The plane z = p.x + p.y·x + p.z·y nearest to these heights.
+fn best_plane(places: &[Vector3<f64>], heights: &[f64]) -> Vector3<f64> {
     let (mut ata, mut atb) = (Matrix3::zeros(), Vector3::zeros());
-    for (place, value) in places.iter().zip(&values) {
+    for (place, height) in places.iter().zip(heights) {
         let row = Vector3::new(1.0, place.x, place.y);
         ata += row * row.transpose();
-        atb += row * *value;
+        atb += row * *height;
     }
-    let Some(inverse) = ata.try_inverse() else { return values };
-    let plane = inverse * atb;
-    let flat = |place: &Vector3<f64>| plane.x + plane.y * place.x + plane.z * place.y;
-    places.iter().zip(values).map(|(place, value)| value - flat(place)).collect()
+    ata.try_inverse().map_or(Vector3::zeros(), |inverse| inverse * atb)
 }

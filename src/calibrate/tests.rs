@@ -358,6 +358,37 @@ fn says_what_is_missing() {
     );
 }
 
+/// Views that turn by 6 mrad while they are read are told from still ones, and σ knows of it.
+#[test]
+fn tells_a_rolling_shutter() {
+    let scene = Scene { n_views: 20, ..Scene::new(Distortion::None) };
+    let still = run(&scene.frames(4), None, Method::Robust(Model::FocalCentre)).unwrap();
+    let share = still.rolling_shutter.unwrap().residual_share;
+    assert!((0.9..1.1).contains(&share), "{share}");
+    let mut random = Random(5);
+    let mut squares = 0.0;
+    for seed in 0..6 {
+        let mut frames = scene.frames(seed);
+        for frame in &mut frames {
+            let turn = [(); 3].map(|()| 6e-3 * random.normal());
+            for corner in &mut frame.corners {
+                // Small turns of the camera about x, y, z move what is seen by these, to first order.
+                let (f, time) = (531.0, corner.pixel.y / 480.0 - 0.5);
+                let [x, y] = [(corner.pixel.x - 321.5) / f, (corner.pixel.y - 240.4) / f];
+                let [a, b, c] = turn.map(|t| t * time);
+                corner.pixel.x += f * (-a * x * y + b * (1.0 + x * x) - c * y);
+                corner.pixel.y += f * (-a * (1.0 + y * y) + b * x * y + c * x);
+            }
+        }
+        let found = run(&frames, None, Method::Robust(Model::FocalCentre)).unwrap();
+        let shutter = found.rolling_shutter.unwrap();
+        assert!(shutter.residual_share < 0.6, "{shutter:?}");
+        assert!(found.focal_px().sigma > shutter.focal_shift_px.abs());
+        squares += normalised(found.focal_px(), 531.0).powi(2) / 6.0;
+    }
+    assert!(squares < 3.0, "{squares}");
+}
+
 /// The more the views leave open, the more a wrong calibration may cost; and it says where.
 #[test]
 fn projection_is_least_known_where_nothing_was_seen() {
@@ -372,8 +403,12 @@ fn projection_is_least_known_where_nothing_was_seen() {
     let (whole_grid, part_grid) = (grid(&whole), grid(&part));
     assert_eq!(part_grid.sigma_px.len(), 25);
     let far = |grid: &ProjectionUncertainty| grid.sigma_px[24];
-    assert!(far(&part_grid) > 4.0 * far(&whole_grid), "{part_grid:?} {whole_grid:?}");
-    assert!(far(&part_grid) > 4.0 * part_grid.sigma_px[6], "{part_grid:?}");
+    assert!(
+        far(&part_grid) > 3.0 * far(&whole_grid),
+        "{:?}",
+        [&part_grid, &whole_grid].map(|g| &g.sigma_px)
+    );
+    assert!(far(&part_grid) > 3.0 * part_grid.sigma_px[6], "{:?}", part_grid.sigma_px);
     assert!(part.unknown_px().is_some());
     let mm = 1e3 * 0.3 / whole.camera.intrinsics.focal_px();
     assert!((whole_grid.sigma_mm[3] / whole_grid.sigma_px[3] - mm).abs() < 1e-12);

@@ -97,8 +97,8 @@ impl File<'_> {
         };
         let numbers: Vec<String> = numbers.into_iter().map(real).collect();
         format!(
-            "# Camera list with one line of data per camera:\n#   CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n{}# Number \
-             of cameras: 1\n1 {model} {width} {height} {}\n",
+            "# Camera list with one line of data per camera:\n#   CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n{}\
+             # Number of cameras: 1\n1 {model} {width} {height} {}\n",
             self.comment("#"),
             numbers.join(" "),
         )

@@ -185,6 +185,7 @@ fn calibration(frames: &[FrameAudit]) -> Calibration {
         surface: None,
         surfaces: Vec::new(),
         left_out: Vec::new(),
+        rolling_shutter: None,
         motion: None,
         distortion: Some(DistortionTest {
             amplitude: Some(estimate(0.01, 0.006)),

@@ -204,6 +204,12 @@ impl<const S: usize, const B: usize> BlockNormal<S, B> {
         true
     }
 
+    /// hᵀ·V⁻¹·h: twice what moving the block's own parameters alone would gain; `None` where they are not determined.
+    pub fn block_gain(&self) -> Option<f64> {
+        let z = Cholesky::new(&self.v)?.forward(&self.h);
+        Some(z.iter().map(|z| z * z).sum())
+    }
+
     /// The diagonal of U: what the block would say about each shared parameter if all others were known.
     pub fn shared_diagonal(&self) -> [f64; S] {
         std::array::from_fn(|i| self.u[i][i])

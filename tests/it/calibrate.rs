@@ -135,8 +135,10 @@ fn ipad_4th_generation_agrees_with_its_factory() {
     }
 }
 
-/// A RealSense of which nothing is told but images, against the intrinsics its owner published (`calibrateCamera` with
-/// fx, fy, centre and five distortion coefficients free).
+/// A RealSense of which nothing is told but images, against the intrinsics its owner published: those of
+/// `calibrateCamera` with fx, fy, centre and five distortion coefficients free, on a board taken for flat and printed
+/// true. Under these assumptions they come out; but the paper print is curled by 1.2 mm and stretched by 0.3 %, and
+/// without that the pixels are square.
 #[test]
 fn realsense_from_images_alone() {
     let Some(folder) = data("realsense-handeye/intrinsics_gray") else { return };
@@ -156,21 +158,24 @@ fn realsense_from_images_alone() {
         .collect();
     let guess = guess_intrinsics(&board, &frames, [1280, 720]);
     let input = Input { board: &board, factory: &guess, tables: None, frames: &frames };
-    let found = calibrate(&input, Method::Robust(Model::BrownAspect)).expect("determined");
-    let pinhole = &found.camera.intrinsics;
-    let sigma = |name: &str| found.parameter(name).expect("free").sigma;
-    let fy_sigma = sigma("focal_px").hypot(pinhole.fx * sigma("aspect"));
+    let plain = calibrate(&input, Method::Plain(Model::BrownAspect)).expect("determined");
+    let sigma = |found: &Calibration, name: &str| found.parameter(name).expect("free").sigma;
+    let pinhole = &plain.camera.intrinsics;
+    let fy_sigma = sigma(&plain, "focal_px").hypot(pinhole.fx * sigma(&plain, "aspect"));
     for (what, ours, published, sigma) in [
-        ("fx", pinhole.fx, 898.29, sigma("focal_px")),
+        ("fx", pinhole.fx, 898.29, sigma(&plain, "focal_px")),
         ("fy", pinhole.fy, 901.07, fy_sigma),
-        ("cx", pinhole.cx, 649.37, sigma("center_x_px")),
-        ("cy", pinhole.cy, 362.53, sigma("center_y_px")),
+        ("cx", pinhole.cx, 649.37, sigma(&plain, "center_x_px")),
+        ("cy", pinhole.cy, 362.53, sigma(&plain, "center_y_px")),
     ] {
         let off = (ours - published).abs();
         println!("{what}: {ours:.2} ± {sigma:.2}, published {published}");
-        assert!(
-            off < 0.001 * published || off < 2.0 * sigma,
-            "{what}: {ours} ± {sigma}, {published}"
-        );
+        assert!(off < 0.001 * published || off < sigma, "{what}: {ours} ± {sigma}, {published}");
     }
+    let found = calibrate(&input, Method::Robust(Model::BrownAspect)).expect("determined");
+    assert!(found.rms_px < 0.2 && plain.rms_px > 0.6, "{} {}", found.rms_px, plain.rms_px);
+    let aspect = found.parameter("aspect").expect("free");
+    assert!((aspect.value - 1.0).abs() < 3.0 * aspect.sigma && aspect.sigma < 0.001, "{aspect:?}");
+    let [stretch, _] = found.surface.and_then(|s| s.print).expect("free");
+    assert!((stretch.value + 0.003).abs() < 4.0 * stretch.sigma, "{stretch:?}");
 }

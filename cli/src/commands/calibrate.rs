@@ -76,6 +76,7 @@ impl Seen {
 fn method(args: &CalibrateArgs, seen: &Seen) -> Method {
     let model = args.model.as_deref();
     match model.and_then(|name| Model::ALL.into_iter().find(|m| m.name() == name)) {
+        Some(model) if args.plain => Method::Plain(model),
         Some(model) => Method::Robust(model),
         None if matches!(args.method, args::Method::Paper) => Method::Paper,
         None if seen.factory.is_none() => Method::Unaided,
@@ -348,6 +349,22 @@ fn stability_rows(calibration: &wire::Calibration) -> Vec<Row> {
         (without.iter().copied().reduce(f64::min), without.iter().copied().reduce(f64::max))
     {
         rows.push(("each left out", format!("focal length {low:.2} to {high:.2} px")));
+    }
+    if let Some(wire::RollingShutter {
+        residual_share: Some(share),
+        focal_shift_px: Some(shift),
+        ..
+    }) = &calibration.rolling_shutter
+    {
+        let words =
+            if *share < 0.8 { "what that does is in the σ" } else { "hardly: nothing moved" };
+        rows.push((
+            "rolling shutter",
+            format!(
+                "residuals fall to {:.0} % if views may move while read, focal length by {shift:+.2} px ({words})",
+                100.0 * share
+            ),
+        ));
     }
     if let Some(grid) = &calibration.projection_uncertainty {
         let sigmas: Vec<f64> = grid.sigma_px.iter().copied().flatten().collect();

@@ -73,6 +73,9 @@ pub struct Calibration {
     /// The focal length without each picture.
     #[serde(default)]
     pub left_out: Vec<LeftOut>,
+    /// Whether the views moved while their images were read; `null` where the views do not tell.
+    #[serde(default)]
+    pub rolling_shutter: Option<RollingShutter>,
     /// What a wrong calibration would cost over the image.
     #[serde(default)]
     pub projection_uncertainty: Option<ProjectionUncertainty>,
@@ -139,6 +142,17 @@ pub struct LeftOut {
     pub frames: Vec<usize>,
     /// Without them.
     pub focal_px: Option<f64>,
+}
+
+/// What is left of the residuals where each view may move while the rows of its image are read.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RollingShutter {
+    /// Their standard deviation as a share of that of still views; near 1 where nothing moved.
+    pub residual_share: Option<f64>,
+    /// What the focal length would change by.
+    pub focal_shift_px: Option<f64>,
+    /// What the principal point would change by; `null` where it is the factory's.
+    pub center_shift_px: Option<[f64; 2]>,
 }
 
 /// What a wrong calibration would cost: one standard deviation of where points at one depth are drawn.
@@ -340,6 +354,13 @@ impl Calibration {
                 .iter()
                 .map(|l| LeftOut { frames: l.frames.clone(), focal_px: finite(l.focal_px) })
                 .collect(),
+            rolling_shutter: calibration.rolling_shutter.map(|shutter| RollingShutter {
+                residual_share: finite(shutter.residual_share),
+                focal_shift_px: finite(shutter.focal_shift_px),
+                center_shift_px: shutter
+                    .center_shift_px
+                    .filter(|c| c.iter().all(|x| x.is_finite())),
+            }),
             projection_uncertainty: calibration
                 .median_distance_m()
                 .and_then(|depth_m| calibration.projection_uncertainty(17, 13, depth_m))

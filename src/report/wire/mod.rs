@@ -23,7 +23,8 @@ pub use audit::{
     FactoryInfo, FindingInfo, Frame, FrameDepthInfo, ResidualMap,
 };
 pub use calibration::{
-    Calibration, Candidate, Distortion, DistortionTest, Hypothesis, Outlier, Parameter, Table, View,
+    BoardSurface, Calibration, Candidate, Distortion, DistortionTest, Hypothesis, LeftOut, Outlier,
+    Parameter, ProjectionUncertainty, Rejected, RollingShutter, Surface, Table, View,
 };
 pub use detect::{Detect, DetectedCorner, DetectedIdentity, DetectedImage, RejectedCorner};
 
