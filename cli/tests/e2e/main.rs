@@ -3,6 +3,7 @@
 mod audit;
 mod bad_input;
 mod board;
+mod calibrate;
 mod detect;
 mod scratch;
 mod usage;
