@@ -114,10 +114,6 @@ pub(super) struct Shutter {
     pub(super) shift: Vec<f64>,
 }
 
-/// Velocities that leave more than this share of the residuals' standard deviation explain nothing: without a rolling
-/// shutter it stays near one, since the degrees of freedom are counted.
-const MOVING_SHARE: f64 = 0.8;
-
 /// The least-squares fit of `shape` from `start`. `None` where the start does not project, or there are fewer residuals
 /// than parameters.
 pub(super) fn fit(shape: Shape<'_>, data: &Data<'_>, start: Start<'_>) -> Option<Fit> {
@@ -187,14 +183,6 @@ fn fit_sized<const S: usize>(shape: Shape<'_>, data: &Data<'_>, start: Start<'_>
     let shutter = (data.wanted == Wanted::Everything)
         .then(|| shutter(&problem, &minimum.normal, (&shared, &loose), &poses))
         .flatten();
-    let covariance = covariance.map(|covariance| match &shutter {
-        Some(shutter) if shutter.share < MOVING_SHARE => {
-            let with_shift = |(i, shift): (usize, &f64)| covariance[i * n + i] + shift * shift;
-            let variances: Vec<f64> = shutter.shift.iter().enumerate().map(with_shift).collect();
-            larger(&covariance, &variances)
-        }
-        _ => covariance,
-    });
     let left_out = match &pooled {
         Some(pooled) => pooled.leave_one_out(),
         None => vec![None; data.n_pictures()],

@@ -8,8 +8,7 @@
 //! Every σ is the larger of two: the classical one (independent corner noise, its size taken from the residuals) and
 //! one that lets residuals of the same picture be correlated in any way, as those of a board that is not quite flat
 //! are ([`Pooled::clustered`](crate::solve::Pooled::clustered)). What is wrong the same way in *every* picture neither of them
-//! sees; a rolling shutter under a hand that moves is nearly that, and enlarges σ where the residuals show it
-//! ([`RollingShutter`]); the shape of the board is that, and is therefore estimated with the
+//! sees; the shape of the board is that, and is therefore estimated with the
 //! camera ([`BoardSurface`]) where held-out pictures ask for it.
 //!
 //! ```
@@ -253,8 +252,9 @@ pub struct LeftOutPicture {
 /// What is left of the residuals where each view may turn and shift while the rows of its image are read, one after
 /// the other: to first order, with 4 mrad and 1 mm known beforehand. (Hand-held cameras with a rolling shutter do.)
 ///
-/// The calibration does not correct for it: most of what it does differs from view to view and averages out. But where
-/// the residuals fall to less than 0.8 of what they were, what the intrinsics would change by is added to their σ.
+/// The calibration does not correct for it: the velocities of single views are known too badly, and freeing them costs
+/// more than it mends. What they do differs from view to view: it averages out, and σ clustered by picture knows of it.
+/// Said beside the result so that who wants better holds the device still.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RollingShutter {
     /// The residuals' standard deviation with motion as a share of that without; degrees of freedom are counted, so

@@ -356,8 +356,7 @@ fn stability_rows(calibration: &wire::Calibration) -> Vec<Row> {
         ..
     }) = &calibration.rolling_shutter
     {
-        let words =
-            if *share < 0.8 { "what that does is in the σ" } else { "hardly: nothing moved" };
+        let words = if *share < 0.8 { "hold the device still" } else { "hardly anything moved" };
         rows.push((
             "rolling shutter",
             format!(
