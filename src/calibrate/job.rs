@@ -1,7 +1,8 @@
 //! The calibration itself.
 
 use super::{
-    Calibration, Candidate, DistortionTest, Error, Input, LeftOutPicture, Method, Model, Parameter, RollingShutter,
+    Calibration, Candidate, DistortionTest, Error, Input, LeftOutPicture, Method, Model, Parameter,
+    RollingShutter,
     auto::{self, MAX_FOCAL_SIGMA, MIN_PICTURES, Prepared},
     distortion,
     fit::{Data, Fit, Start, Wanted, fit},

@@ -7,9 +7,9 @@
 //!
 //! Every σ is the larger of two: the classical one (independent corner noise, its size taken from the residuals) and
 //! one that lets residuals of the same picture be correlated in any way, as those of a board that is not quite flat
-//! are ([`Pooled::clustered`](crate::solve::Pooled::clustered)). What is wrong the same way in *every* picture neither of them
-//! sees; the shape of the board is that, and is therefore estimated with the
-//! camera ([`BoardSurface`]) where held-out pictures ask for it.
+//! are ([`Pooled::clustered`](crate::solve::Pooled::clustered)). What is wrong the same way in *every* picture neither
+//! of them sees; the shape of the board is that, and is therefore estimated with the camera ([`BoardSurface`]) where
+//! held-out pictures ask for it.
 //!
 //! ```
 //! use truedepth::board::CharucoBoard;

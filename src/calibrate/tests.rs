@@ -1,8 +1,8 @@
 //! The whole room on corners of known cameras.
 
 use super::{
-    Calibration, Error, Estimate, FrameCorners, Input, Lens, Method, Model, ProjectionUncertainty,
-    Rejection, SurfaceKind, calibrate, coverage, guess_intrinsics,
+    Calibration, Error, Estimate, FrameCorners, Input, Lens, Method, Model, Rejection, SurfaceKind,
+    calibrate, coverage, guess_intrinsics,
     synthetic::{FACTORY, Random, Scene, board, pose, tables},
 };
 use crate::{
