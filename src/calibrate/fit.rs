@@ -2,7 +2,7 @@
 
 use super::{
     Estimate,
-    model::Shape,
+    model::{Center, Shape},
     motion::{Joint, MeanMotion},
     problem::{Measured, Reprojection},
     surface::{Form, Sheet},
@@ -114,6 +114,11 @@ pub(super) struct Shutter {
     pub(super) shift: Vec<f64>,
 }
 
+/// Where velocities leave less than this share of the residuals' standard deviation, views did move: without a rolling
+/// shutter it stays near one, since the degrees of freedom are counted. A turn while rows are read looks like another
+/// principal point; hands turn the same way again and again, so that this does not average out, and its σ has to know.
+const MOVING_SHARE: f64 = 0.8;
+
 /// The least-squares fit of `shape` from `start`. `None` where the start does not project, or there are fewer residuals
 /// than parameters.
 pub(super) fn fit(shape: Shape<'_>, data: &Data<'_>, start: Start<'_>) -> Option<Fit> {
@@ -183,6 +188,14 @@ fn fit_sized<const S: usize>(shape: Shape<'_>, data: &Data<'_>, start: Start<'_>
     let shutter = (data.wanted == Wanted::Everything)
         .then(|| shutter(&problem, &minimum.normal, (&shared, &loose), &poses))
         .flatten();
+    let covariance = covariance.map(|covariance| match &shutter {
+        Some(shutter) if shutter.share < MOVING_SHARE && shape.center == Center::Free => {
+            let mut variances: Vec<f64> = (0..3).map(|i| covariance[i * n + i]).collect();
+            (1..3).for_each(|i| variances[i] += shutter.shift[i] * shutter.shift[i]);
+            larger(&covariance, &variances)
+        }
+        _ => covariance,
+    });
     let left_out = match &pooled {
         Some(pooled) => pooled.leave_one_out(),
         None => vec![None; data.n_pictures()],
@@ -271,7 +284,7 @@ mod tests {
     use crate::{
         calibrate::{
             Input,
-            model::{Aspect, Center, Warp},
+            model::{Aspect, Warp},
             surface::Surface,
             synthetic::{FACTORY, Scene, board},
             views::all_usable,

@@ -164,7 +164,7 @@ impl Ready<'_> {
 
 /// How far a view may turn (radians) and shift (metres) while the rows of its image are read: a hand leads a camera by
 /// a quarter of a radian and some centimetres a second, and reading takes some ten milliseconds.
-const MOTION_SIGMA: [f64; 6] = [4e-3, 4e-3, 4e-3, 1e-3, 1e-3, 1e-3];
+const MOTION_SIGMA: [f64; 6] = [4e-3, 4e-3, 4e-3, 2e-3, 2e-3, 2e-3];
 
 impl<const S: usize> Reprojection<'_, S> {
     /// Adds all residuals of a view; `own` takes the derivatives by the pose, and the time at which the corner's row is

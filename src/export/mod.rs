@@ -5,11 +5,11 @@
 //!
 //! | format | lens | pixel centres |
 //! |---|---|---|
-//! | OpenCV `FileStorage` YAML | k1 k2 p1 p2 k3 | integers |
+//! | OpenCV `FileStorage` YAML | k1 k2 p1 p2 k3, for tables also k4 k5 k6 | integers |
 //! | Kalibr `camchain.yaml` | radtan: k1 k2 p1 p2 | integers |
-//! | mrcal `.cameramodel` | `LENSMODEL_OPENCV5`: k1 k2 p1 p2 k3 | integers |
-//! | COLMAP `cameras.txt` | `FULL_OPENCV`: k1 k2 p1 p2 k3 | half integers: centres are written +0.5 |
-//! | ROS `camera_info` YAML | `plumb_bob`: k1 k2 p1 p2 k3 | integers |
+//! | mrcal `.cameramodel` | `LENSMODEL_OPENCV5`, for tables `OPENCV8` | integers |
+//! | COLMAP `cameras.txt` | `FULL_OPENCV` | half integers: centres are written +0.5 |
+//! | ROS `camera_info` YAML | `plumb_bob`, for tables `rational_polynomial` | integers |
 //! | Open3D pinhole JSON | none: for images that have been straightened | integers |
 //!
 //! ```
@@ -68,10 +68,10 @@ impl Format {
         }
     }
 
-    /// The numbers of Brown's lens that it holds, of k1 k2 p1 p2 k3 the first so many.
+    /// The numbers of OpenCV's lens that it holds, of k1 k2 p1 p2 k3 k4 k5 k6 the first so many.
     const fn n_lens(self) -> usize {
         match self {
-            Self::OpenCv | Self::Mrcal | Self::Colmap | Self::Ros => 5,
+            Self::OpenCv | Self::Mrcal | Self::Colmap | Self::Ros => 8,
             Self::Kalibr => 4,
             Self::Open3d => 0,
         }
@@ -159,7 +159,7 @@ mod tests {
                 exported.text, golden,
                 "{file}: if that is meant, run with UPDATE_GOLDEN=1 and verify.py"
             );
-            assert_eq!(exported.residual.is_some(), format.n_lens() < 5, "{}", format.name());
+            assert_eq!(exported.residual.is_some(), format.n_lens() < 8, "{}", format.name());
         }
     }
 
@@ -175,18 +175,18 @@ mod tests {
         let radius = RadialTable::farthest_corner_px(center, 640, 480);
         let table = RadialTable::new(center, radius, magnification).unwrap();
         let camera = camera(Distortion::Table(TablePair::from_inverse(table)));
-        let (lens, residual) = lens::nearest(&camera, 5);
-        let residual = residual.unwrap();
-        assert!(residual.max_px < 0.05 && residual.rms_px < 0.02, "{residual:?}");
+        let (lens, residual) = lens::nearest(&camera, 8);
+        let [fewer, residual] = [lens::nearest(&camera, 5).1.unwrap(), residual.unwrap()];
+        assert!(fewer.max_px < 0.05 && fewer.rms_px < 0.02, "{fewer:?}");
+        assert!(residual.rms_px <= fewer.rms_px, "{residual:?} {fewer:?}");
         // As it says: both cameras beside each other.
-        let brown = Camera { distortion: Distortion::Brown(lens), ..camera.clone() };
         let mut worst: f64 = 0.0;
         for (x, y) in (0..=31).flat_map(|i| (0..=23).map(move |j| (i * 20, j * 20))) {
             let pixel = Pixel::new(f64::from(x), f64::from(y));
-            let again = brown.project_ray(camera.unproject(pixel).unwrap()).unwrap();
-            worst = worst.max(again.distance(pixel));
+            let again = lens::drawn(&lens, camera.unproject(pixel).unwrap());
+            worst = worst.max(camera.intrinsics.pixel_from_ray(again).distance(pixel));
         }
-        assert!(worst < 1.1 * residual.max_px && worst > 0.5 * residual.max_px, "{worst}");
+        assert!(worst < 1.1 * residual.max_px && worst > 0.3 * residual.max_px, "{worst}");
         let pinhole = lens::nearest(&camera, 0).1.unwrap();
         assert!((pinhole.max_px - 0.0099 * radius).abs() < 0.1, "{pinhole:?}");
         assert!(calibration(&camera, "", Format::Kalibr).text.contains("differs by"));

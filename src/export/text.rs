@@ -1,12 +1,12 @@
 //! The files themselves: short, and written by hand.
 
-use super::Residual;
-use crate::camera::{Brown, Intrinsics};
+use super::{Residual, lens::Numbers};
+use crate::camera::Intrinsics;
 
 /// What goes into a file.
 pub(super) struct File<'a> {
     pub(super) intrinsics: &'a Intrinsics,
-    pub(super) lens: Brown,
+    pub(super) lens: Numbers,
     pub(super) residual: Option<Residual>,
     pub(super) name: String,
 }
@@ -25,6 +25,12 @@ impl File<'_> {
     fn matrix(&self) -> [f64; 9] {
         let Intrinsics { fx, fy, cx, cy, .. } = *self.intrinsics;
         [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0]
+    }
+
+    /// k1 k2 p1 p2 k3, and k4 k5 k6 where there is a denominator.
+    fn lens(&self) -> &[f64] {
+        let has_denominator = self.lens[5..].iter().any(|k| *k != 0.0);
+        &self.lens[..if has_denominator { 8 } else { 5 }]
     }
 
     /// What cannot be read off the numbers, as a comment.
@@ -53,7 +59,7 @@ impl File<'_> {
             self.comment("#"),
             self.name,
             matrix(3, 3, &self.matrix()),
-            matrix(5, 1, &self.lens.parameters()),
+            matrix(self.lens().len(), 1, self.lens()),
         )
     }
 
@@ -65,7 +71,7 @@ impl File<'_> {
              distortion_coeffs: [{}]\n  resolution: [{width}, {height}]\n  rostopic: /{}/image_raw\n",
             self.comment("#"),
             list(&[fx, fy, cx, cy]),
-            list(&self.lens.parameters()[..4]),
+            list(&self.lens[..4]),
             self.name,
         )
     }
@@ -74,9 +80,10 @@ impl File<'_> {
     pub(super) fn mrcal(&self) -> String {
         let Intrinsics { fx, fy, cx, cy, width, height } = *self.intrinsics;
         let mut numbers = vec![fx, fy, cx, cy];
-        numbers.extend(self.lens.parameters());
+        numbers.extend(self.lens());
+        let n_lens = self.lens().len();
         format!(
-            "{}{{\n    'lensmodel':  'LENSMODEL_OPENCV5',\n\n    # fx, fy, cx, cy, k1, k2, p1, p2, k3\n    \
+            "{}{{\n    'lensmodel':  'LENSMODEL_OPENCV{n_lens}',\n\n    # fx, fy, cx, cy, k1, k2, p1, p2, k3 ...\n    \
              'intrinsics': [ {}, ],\n\n    'extrinsics': [ 0, 0, 0, 0, 0, 0, ],\n\n    'imagersize': [ {width}, \
              {height}, ],\n}}\n",
             self.comment("#"),
@@ -88,11 +95,10 @@ impl File<'_> {
     pub(super) fn colmap(&self) -> String {
         let Intrinsics { fx, fy, cx, cy, width, height } = *self.intrinsics;
         let mut numbers = vec![fx, fy, cx + 0.5, cy + 0.5];
-        let model = if self.lens == Brown::ZERO {
+        let model = if self.lens == [0.0; 8] {
             "PINHOLE"
         } else {
-            numbers.extend(self.lens.parameters());
-            numbers.extend([0.0; 3]); // k4 k5 k6
+            numbers.extend(self.lens);
             "FULL_OPENCV"
         };
         let numbers: Vec<String> = numbers.into_iter().map(real).collect();
@@ -109,16 +115,17 @@ impl File<'_> {
         let Intrinsics { width, height, .. } = self.intrinsics;
         let k = self.matrix();
         let projection = [k[0], 0.0, k[2], 0.0, 0.0, k[4], k[5], 0.0, 0.0, 0.0, 1.0, 0.0];
+        let model = if self.lens().len() > 5 { "rational_polynomial" } else { "plumb_bob" };
         let identity = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
         let matrix = |name: &str, rows: usize, cols: usize, data: &[f64]| {
             format!("{name}:\n  rows: {rows}\n  cols: {cols}\n  data: [{}]\n", list(data))
         };
         format!(
-            "{}image_width: {width}\nimage_height: {height}\ncamera_name: {}\n{}distortion_model: plumb_bob\n{}{}{}",
+            "{}image_width: {width}\nimage_height: {height}\ncamera_name: {}\n{}distortion_model: {model}\n{}{}{}",
             self.comment("#"),
             self.name,
             matrix("camera_matrix", 3, 3, &k),
-            matrix("distortion_coefficients", 1, 5, &self.lens.parameters()),
+            matrix("distortion_coefficients", 1, self.lens().len(), self.lens()),
             matrix("rectification_matrix", 3, 3, &identity),
             matrix("projection_matrix", 3, 4, &projection),
         )
