@@ -253,9 +253,9 @@ pub struct LeftOutPicture {
 /// the other: to first order, with 4 mrad and 2 mm known beforehand. (Hand-held cameras with a rolling shutter do.)
 ///
 /// The calibration does not correct for it: the velocities of single views are known too badly, and freeing them
-/// costs more than it mends. What they do to the focal length differs from view to view: it averages out, and σ clustered by
-/// picture knows of it. A turn looks like another principal point, though, and hands turn the same way again: where
-/// `residual_share` is below 0.8, what the principal point would change by is added to its σ.
+/// costs more than it mends. What they do to the focal length differs from view to view: it averages out, and σ
+/// clustered by picture knows of it. A turn looks like another principal point, though, and hands turn the same way
+/// again: where `residual_share` is below 0.8, what the principal point would change by is added to its σ.
 /// Said beside the result so that who wants better holds the device still.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RollingShutter {
