@@ -4,6 +4,7 @@ use super::Calibration;
 use crate::{
     camera::Camera,
     geom::{Board, Color, Pixel, Point, Pose, Vector3},
+    solve::Response,
 };
 
 /// How the camera as a whole moves against the boards when its numbers change and all poses follow; with the
@@ -39,7 +40,7 @@ impl MeanMotion {
     ///
     /// A step (ω, τ) of a pose moves a point p of the camera's frame by ω × (p − t) + τ = ω × p + (τ − ω × t).
     pub(super) fn new(
-        responses: Vec<([[f64; 6]; 6], Vec<[f64; 6]>)>,
+        responses: Vec<Response<6>>,
         poses: &[Pose<Color, Board>],
         planes: &[[f64; 6]],
         &Joint { covariance, variance, n_camera }: &Joint<'_>,

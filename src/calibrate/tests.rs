@@ -271,7 +271,7 @@ fn views_of(wave: [f64; 4], wave_m: f64, seed: u64) -> Vec<FrameCorners> {
     let mut random = Random(seed);
     (0..20)
         .map(|frame| {
-            let azimuth = random.uniform(0.0, 6.28);
+            let azimuth = random.uniform(0.0, std::f64::consts::TAU);
             let at = [(-0.03, 0.03), (-0.03, 0.03), (0.2, 0.35)]
                 .map(|(low, high)| random.uniform(low, high));
             let pose = pose(random.uniform(0.2, 0.7), azimuth, random.uniform(-1.0, 1.0), at);

@@ -59,5 +59,5 @@ pub use cholesky::{Cholesky, DenseCholesky};
 pub use covariance::{LeftOut, Pooled, larger, total};
 pub use lm::{Effort, LeastSquares, Minimum, Solution, minimize};
 pub use loss::Loss;
-pub use schur::{Arrow, ArrowNormal, BlockNormal, Bordered, BySchur, Reduced};
+pub use schur::{Arrow, ArrowNormal, BlockNormal, Bordered, BySchur, Reduced, Response};
 pub use stats::{mad_sigma, mean, median, quantile, rms, standard_deviation, standard_error};

@@ -218,7 +218,7 @@ impl<const S: usize, const B: usize> BlockNormal<S, B> {
     /// (V)⁻¹, the covariance of the block's own parameters for unit variance with the others known, and how these
     /// follow the others: δ_block = −V⁻¹·Wᵀ·δ_u, as one column per shared and loose parameter (of `n`). `None` where
     /// the block's own are not determined.
-    pub fn block_response(&self, n: usize) -> Option<([[f64; B]; B], Vec<[f64; B]>)> {
+    pub fn block_response(&self, n: usize) -> Option<Response<B>> {
         let factor = Cholesky::new(&self.v)?;
         let mut follows = vec![[0.0; B]; n];
         let minus = |row: &[f64; B]| factor.solve(row).map(|x| -x);
@@ -231,6 +231,9 @@ impl<const S: usize, const B: usize> BlockNormal<S, B> {
         Some((factor.inverse(), follows))
     }
 }
+
+/// A block's own covariance, and how its parameters follow each shared and loose one.
+pub type Response<const B: usize> = ([[f64; B]; B], Vec<[f64; B]>);
 
 /// What one block, or a sum of blocks, says about the shared parameters and, after these, the loose ones.
 #[derive(Clone, Debug, PartialEq)]
@@ -432,12 +435,13 @@ mod tests {
             for &(t, y) in &self.curves[index] {
                 let e = (-k * t).exp();
                 let parameter = (10.0 * t / 3.0).round() as usize;
-                let bump = if parameter % 10 == 0 { loose.get(parameter / 10) } else { None };
+                let bump =
+                    if parameter.is_multiple_of(10) { loose.get(parameter / 10) } else { None };
                 let bump = bump.copied().unwrap_or(0.0);
                 let residual = y - (a * e + b + c * t * t * (1.0 + bump));
                 let by_shared = [-t * a * e, t * t * (1.0 + bump)];
                 normal.add_row(1.0, residual, &by_shared, &[e, 1.0]);
-                if parameter % 10 == 0 && !loose.is_empty() {
+                if parameter.is_multiple_of(10) && !loose.is_empty() {
                     let at = (parameter / 10, c * t * t);
                     normal.add_loose((1.0, residual), (&by_shared, &[e, 1.0]), at);
                 }

@@ -129,6 +129,9 @@ fn look(args: &CalibrateArgs, terminal: &Terminal) -> Result<Seen, Failure> {
     }
 }
 
+/// Columns and rows of an image, and its corners.
+type SizedCorners = ([usize; 2], Vec<Corner>);
+
 /// Decodes and searches all images; those of another size than the first are refused.
 fn corners(
     name: &str,
@@ -139,7 +142,7 @@ fn corners(
 ) -> Result<(Vec<FrameCorners>, [usize; 2]), Failure> {
     let detector = Detector::new(board);
     let bar = terminal.progress(name, frames.len());
-    let found: Vec<Result<([usize; 2], Vec<Corner>), Failure>> = frames
+    let found: Vec<Result<SizedCorners, Failure>> = frames
         .par_iter()
         .map(|index| {
             let image = gray(index)?;
