@@ -1,8 +1,12 @@
 //! What was typed.
 
+mod paper;
+
 use std::path::PathBuf;
 
 use clap::{Parser, Subcommand, ValueEnum, builder::PossibleValuesParser};
+use paper::{COMPARE_EXAMPLES, INSPECT_EXAMPLES};
+pub(crate) use paper::{CompareArgs, InspectArgs};
 use truedepth::{
     board::{self, CharucoBoard, Dictionary},
     calibrate::Model,
@@ -117,6 +121,23 @@ pub(crate) enum Command {
     /// ids are those of OpenCV 4.6 and newer. The detector may miss a corner; it does not guess.
     #[command(after_help = DETECT_EXAMPLES)]
     Detect(DetectArgs),
+
+    /// What the metadata alone tell: which device, how sure, which known issue; needs no board
+    ///
+    /// Reads no image. The device is told by its reference dimensions, focal length and principal point, compared with
+    /// the published ones of arXiv:2201.10865 and your own (--devices). What it says of a known issue is an
+    /// expectation, not a measurement: `audit` measures.
+    ///
+    /// Exits with 3 where the metadata are at fault, 0 otherwise, also where a known issue is to be expected.
+    #[command(after_help = INSPECT_EXAMPLES)]
+    Inspect(InspectArgs),
+
+    /// Compare the factory parameters of one device: AVFoundation's with ARKit's, or yesterday's with today's
+    ///
+    /// Of different APIs: every derived column of the tables of arXiv:2201.10865, which issue the pair shows, and both
+    /// corrections with their numbers. Of one API: whether the factory calibration has changed (TD205). Exits with 0.
+    #[command(after_help = COMPARE_EXAMPLES)]
+    Compare(CompareArgs),
 
     /// Simulate a faulty iPad, audit it, and show truth beside findings; needs no device and no data
     ///

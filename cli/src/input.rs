@@ -8,8 +8,9 @@ use std::{
 use truedepth::{
     board::{CharucoBoard, Dictionary},
     camera::Camera,
+    diagnose::{self, Registry, Sheet},
     image,
-    recording::{self, Found, Limits, board_from_toml},
+    recording::{self, Found, Limits, Recording, board_from_toml},
     report::wire::Document,
 };
 
@@ -139,6 +140,43 @@ pub(crate) fn board_of(argument: &BoardArgument) -> Result<CharucoBoard, Failure
     }
 }
 
+/// The published devices, and those of the user's own file.
+pub(crate) fn registry(devices: Option<&Path>) -> Result<Registry, Failure> {
+    let mut registry = Registry::published();
+    if let Some(path) = devices {
+        registry.extend(&path.display().to_string(), &text_of(path)?)?;
+    }
+    Ok(registry)
+}
+
+/// One side of a comparison: a row of the registry, a recording, or a DepthMetadata.json.
+pub(crate) fn side(
+    text: &str,
+    registry: &Registry,
+    args: &InputArgs,
+) -> Result<diagnose::Side, Failure> {
+    if let Some(entry) = registry.get(text) {
+        let (name, api) = (entry.name(), Some(entry.api));
+        return Ok(diagnose::Side { name, api, sheet: entry.sheet });
+    }
+    let path = Path::new(text);
+    if !path.exists() {
+        let message = format!("{text} is neither a file or folder nor a row of the registry");
+        return Err(Failure::new(message).hint("`truedepth compare --list` names all rows"));
+    }
+    let factory = if path.is_file() && has_extension(path, &["json"]) {
+        let factories = recording::factories_in_metadata(text, &read(path)?)?;
+        factories.into_iter().next()
+    } else {
+        Recording::open(path, &limits(args))?.factory().cloned()
+    };
+    let sheet = factory.as_ref().and_then(Sheet::from_factory).ok_or_else(|| {
+        Failure::new(format!("{text} has no factory metadata with reference dimensions"))
+            .hint("record with an app that saves IntrinsicMatrixReferenceDimensions")
+    })?;
+    Ok(diagnose::Side { name: text.to_owned(), api: None, sheet })
+}
+
 /// A file that is text.
 fn text_of(path: &Path) -> Result<String, Failure> {
     fs::read_to_string(path).map_err(|e| unreadable(path, e))
@@ -157,6 +195,7 @@ pub(crate) fn camera(path: &Path) -> Result<Camera, Failure> {
             audit.calibration.ok_or_else(|| wrong(Failure::new("this audit did not calibrate")))?
         }
         Document::Detect(_) => return Err(wrong(Failure::new("it holds detected corners"))),
+        _ => return Err(wrong(Failure::new("it is the result of another verb"))),
     };
     calibration.camera().map_err(|e| wrong(e.into()))
 }

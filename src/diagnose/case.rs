@@ -65,6 +65,28 @@ pub struct Case<'a> {
 /// 4.8 px, when a new OpenCV had changed the board's layout under it.
 pub(super) const MAX_RMS_PX: f64 = 1.0;
 
+impl<'a> Case<'a> {
+    /// Nothing read and nothing seen yet.
+    pub(super) fn unseen(board: &'a CharucoBoard, tolerances: Tolerances) -> Self {
+        Self {
+            problems: &[],
+            n_frames: 0,
+            size_px: None,
+            factory: None,
+            board,
+            observations: &[],
+            calibration: None,
+            no_calibration: None,
+            camera: None,
+            factory_views: &[],
+            own_views: &[],
+            factory_depth: None,
+            own_depth: None,
+            tolerances,
+        }
+    }
+}
+
 impl Case<'_> {
     /// Frames in which the board was seen.
     pub(super) fn n_seen(&self) -> usize {

@@ -28,6 +28,9 @@ mod case;
 mod code;
 mod device;
 mod finding;
+mod inspect;
+mod pair;
+mod registry;
 
 mod td101_files;
 mod td102_dropped_frames;
@@ -57,5 +60,10 @@ pub use case::{Case, diagnose};
 pub use code::{Code, UnknownCode};
 pub use device::{Device, DistortionState, Sensor};
 pub use finding::{Correction, Evidence, Finding, Tolerances, Unit, Verdict};
+pub use inspect::{Inspection, inspect};
+pub use pair::{AcrossApis, Comparison, SameApi, Side, compare, pairs};
+pub use registry::{
+    Api, Certainty, Entry, Identity, KnownIssue, Registry, RegistryError, Sheet,
+};
 pub use td205_factory_changed::factory_changed;
 pub use td502_reference_dimensions::reference_dimensions;

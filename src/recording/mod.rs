@@ -58,6 +58,7 @@ pub use limits::Limits;
 pub use problem::Problem;
 pub use source::{Memory, Source};
 pub use write::{Sink, Writer, encode_depth};
+pub use zeiss::factories_in_metadata;
 
 use std::{fmt, sync::Arc};
 

@@ -163,6 +163,19 @@ pub(super) fn open(
     })
 }
 
+/// What a `DepthMetadata.json` says about the camera, record by record; `file` names it in messages.
+pub fn factories_in_metadata(file: &str, bytes: &[u8]) -> Result<Vec<Factory>, Error> {
+    let records: Vec<DepthRecord> = json::records(file, bytes)?;
+    let mut odd = Vec::new();
+    records
+        .iter()
+        .enumerate()
+        .map(|(i, depth)| {
+            depth.factory(At { file, record: i + 1, timestamp: depth.timestamp }, &mut odd)
+        })
+        .collect()
+}
+
 /// Whether the intrinsics of the frames differ.
 fn variation<'a>(factories: impl Iterator<Item = &'a Factory>) -> Option<Problem> {
     let none = [f64::INFINITY, f64::NEG_INFINITY];

@@ -1,6 +1,8 @@
 //! A small audit made by hand for the tests of this room: an iPad whose factory focal length is 6.6 % too long, seen
 //! in twelve frames. All randomness is a fixed sequence.
 
+use std::sync::Arc;
+
 use super::{Closeup, Photo, PhotoSize, Pictures};
 use crate::{
     audit::{Audit, FrameAudit, Method},
@@ -18,7 +20,7 @@ use crate::{
     geom::{Board, Color, Pixel, Pose, Rotation, Vector3},
     image::{DepthMap, Rgb},
     pose::View,
-    recording::{Factory, Problem},
+    recording::{Factory, Limits, Memory, Problem, Recording, Writer},
 };
 
 const N_FRAMES: usize = 12;
@@ -65,6 +67,18 @@ pub(super) fn audit() -> Audit {
         frames,
         board,
     }
+}
+
+/// A recording of one frame with the metadata of [`audit`].
+pub(super) fn recording() -> Recording {
+    let audit = audit();
+    let factory = audit.factory.as_ref().expect("the sample has metadata");
+    let mut writer = Writer::new(Memory::new("iPadPro12_5gen"));
+    let color = Rgb::new(640, 480, vec![[90; 3]; 640 * 480]);
+    let depth = DepthMap::new(640, 480, vec![0.25; 640 * 480]);
+    writer.frame(500, &color, &depth, factory).expect("memory takes everything");
+    let memory = writer.finish().expect("as above");
+    Recording::from_source(Arc::new(memory), &Limits::default()).expect("it was just written")
 }
 
 /// Grey pictures, and a depth map.

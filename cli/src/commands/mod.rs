@@ -3,10 +3,12 @@
 mod audit;
 mod board;
 mod calibrate;
+mod compare;
 mod completions;
 mod demo;
 mod detect;
 mod explain;
+mod inspect;
 mod man;
 mod simulate;
 
@@ -28,6 +30,8 @@ pub(crate) fn dispatch(args: Args, terminal: &Terminal) -> Result<Outcome, Failu
     match args.command {
         Command::Audit(args) => audit::run(&args, terminal),
         Command::Board(args) => board::run(&args, terminal),
+        Command::Inspect(args) => inspect::run(&args, terminal),
+        Command::Compare(args) => compare::run(&args, terminal),
         Command::Calibrate(args) => calibrate::run(&args, terminal),
         Command::Demo(args) => demo::run(&args, terminal),
         Command::Simulate(args) => simulate::run(&args, terminal),

@@ -318,7 +318,7 @@ fn mirrored(frames: &[FrameAudit]) -> Option<bool> {
 }
 
 impl DeviceInfo {
-    fn new(device: &Device, factory: Option<&Factory>) -> Self {
+    pub(super) fn new(device: &Device, factory: Option<&Factory>) -> Self {
         Self {
             sensor: device.sensor.name().to_owned(),
             device_type: device.device_type.clone(),

@@ -17,6 +17,7 @@
 mod audit;
 mod calibration;
 mod detect;
+mod devices;
 
 pub use audit::{
     Alignment, Audit, Board, CorrectionInfo, Depth, DepthNoise, DeviceInfo, EvidenceInfo,
@@ -27,6 +28,7 @@ pub use calibration::{
     Parameter, ProjectionUncertainty, Rejected, RollingShutter, Surface, Table, View,
 };
 pub use detect::{Detect, DetectedCorner, DetectedIdentity, DetectedImage, RejectedCorner};
+pub use devices::{Compare, IdentityInfo, Inspect, PairCorrections, PairInfo, SheetInfo, SideInfo};
 
 use serde::{Deserialize, Serialize};
 
@@ -46,6 +48,12 @@ pub enum Document {
     /// What `truedepth audit --json` prints and `report.json` holds.
     #[serde(rename = "truedepth.audit/1")]
     Audit(Box<Audit>),
+    /// What `truedepth inspect --json` prints.
+    #[serde(rename = "truedepth.inspect/1")]
+    Inspect(Box<Inspect>),
+    /// What `truedepth compare --json` prints.
+    #[serde(rename = "truedepth.compare/1")]
+    Compare(Compare),
 }
 
 impl Document {
@@ -78,6 +86,7 @@ mod tests {
     use crate::{
         camera::{self, Brown, RadialTable, TablePair},
         detect::Observation,
+        diagnose,
         geom::Pixel,
         report::{sample, to_json},
     };
@@ -116,6 +125,21 @@ mod tests {
     #[test]
     fn audit() {
         golden("audit.json", &Document::Audit(Box::new(Audit::from(&sample::audit()))));
+    }
+
+    #[test]
+    fn compare() {
+        let pairs = diagnose::pairs(&diagnose::Registry::published());
+        let some = [&pairs[2], &pairs[7]].map(Clone::clone);
+        golden("compare.json", &Document::Compare(Compare::new(&some)));
+    }
+
+    #[test]
+    fn inspect() {
+        let recording = sample::recording();
+        let registry = diagnose::Registry::published();
+        let inspection = diagnose::inspect(&recording, &registry);
+        golden("inspect.json", &Document::Inspect(Box::new(Inspect::new(&recording, &inspection))));
     }
 
     #[test]
