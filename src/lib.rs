@@ -64,6 +64,9 @@ pub mod audit;
 // Synthetic recordings with ground truth and chosen faults.
 pub mod simulate;
 
+// Corrections applied: a recording in, a true one out, with provenance.
+pub mod correct;
+
 // What leaves the library: JSON, HTML, SVG.
 pub mod report;
 

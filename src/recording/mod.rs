@@ -39,9 +39,12 @@ mod limits;
 mod metadata;
 mod pairing;
 mod problem;
+mod rewrite;
 mod source;
 #[cfg(test)]
 mod tests;
+#[cfg(feature = "fs")]
+mod whole;
 mod write;
 mod zeiss;
 
@@ -56,7 +59,10 @@ pub use folder::{Folder, FolderSink};
 pub use frame::{Factory, Frame};
 pub use limits::Limits;
 pub use problem::Problem;
+pub use rewrite::Amendment;
 pub use source::{Memory, Source};
+#[cfg(feature = "fs")]
+pub use whole::WholeFolder;
 pub use write::{Sink, Writer, encode_depth};
 pub use zeiss::factories_in_metadata;
 
@@ -140,6 +146,23 @@ impl Recording {
     /// The bytes of any file of the recording, like those that [`Frame::color`] and [`Frame::depth`] name.
     pub fn file(&self, name: &str) -> Result<Vec<u8>, Error> {
         self.source.read(&format!("{}{name}", self.prefix), self.limits.file_bytes)
+    }
+
+    /// The names of all files of the recording, folders inside included, in order.
+    pub fn file_names(&self) -> Vec<&str> {
+        let mut names: Vec<&str> = self
+            .source
+            .names()
+            .iter()
+            .filter_map(|name| name.strip_prefix(self.prefix.as_str()))
+            .collect();
+        names.sort_unstable();
+        names
+    }
+
+    /// Whether a file is named like an image of a frame, and so would count as one if it could.
+    pub fn is_image_name(&self, name: &str) -> bool {
+        pairing::parse_name(name).is_some()
     }
 
     fn color<T>(

@@ -147,6 +147,12 @@ impl std::fmt::Display for Python {
     }
 }
 
+/// Numbers as the app writes tuples, a string: `"(1.0, 0.0)"`.
+pub(super) fn tuple(values: &[f64]) -> String {
+    let values: Vec<String> = values.iter().map(|&v| Python(v).to_string()).collect();
+    format!("\"({})\"", values.join(", "))
+}
+
 /// A JSON object in the app's spelling: sorted keys, two spaces, ` : `.
 #[derive(Default)]
 struct Record(String);
@@ -168,8 +174,7 @@ impl Record {
     }
 
     fn tuple(&mut self, key: &str, values: &[f64]) {
-        let values: Vec<String> = values.iter().map(|&v| Python(v).to_string()).collect();
-        self.entry(key, &format!("\"({})\"", values.join(", ")));
+        self.entry(key, &tuple(values));
     }
 
     fn list(&mut self, key: &str, values: &[f64]) {

@@ -1,0 +1,53 @@
+//! Why a correction cannot be made.
+
+use crate::recording;
+
+/// A correction that cannot be made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A file cannot be read or written.
+    #[error(transparent)]
+    Recording(#[from] recording::Error),
+    /// A parameter no camera has.
+    #[error("{step}: {value} is not possible; take {range}")]
+    Parameter {
+        /// The step, by name.
+        step: &'static str,
+        /// As given.
+        value: String,
+        /// What is possible.
+        range: &'static str,
+    },
+    /// The same step twice.
+    #[error("`{0}` is given twice; give it once")]
+    Twice(&'static str),
+    /// The recording lacks what a step needs.
+    #[error("{recording}: {step} needs {what}, which the recording does not have; {remedy}")]
+    Missing {
+        /// Where the recording is.
+        recording: String,
+        /// The step, by name.
+        step: &'static str,
+        /// What is missing.
+        what: &'static str,
+        /// What to do instead.
+        remedy: &'static str,
+    },
+    /// A camera for images of another size.
+    #[error(
+        "the calibration given is for images of {}x{} pixels, {recording} has {}x{}: give one made at that size",
+        .given[0], .given[1], .size[0], .size[1]
+    )]
+    CameraSize {
+        /// Where the recording is.
+        recording: String,
+        /// Columns and rows of the camera given.
+        given: [usize; 2],
+        /// Columns and rows of the images.
+        size: [usize; 2],
+    },
+    /// A finding that names no way back.
+    #[error("{0}")]
+    NoWay(String),
+}

@@ -1,0 +1,272 @@
+//! The correction itself, frame by frame.
+
+use sha2::{Digest, Sha256};
+
+use super::{
+    Error, Mirrored, Plan,
+    map::{Geometry, PixelMap, mirrored},
+    warp::{ColorWarp, DepthWarp},
+};
+use crate::{
+    camera::Intrinsics,
+    image::{DepthMap, Rgb},
+    recording::{Amendment, Factory, Recording, Sink, encode_depth},
+};
+
+/// What is written beside the corrected files; never carried over as an ordinary file.
+pub const PROVENANCE: &str = "provenance.json";
+
+/// A file of the input and its SHA-256.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FileHash {
+    /// Its name.
+    pub name: String,
+    /// In hexadecimal digits.
+    pub sha256: String,
+}
+
+/// What was done.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Corrected {
+    /// Every file of the input, by name.
+    pub files: Vec<FileHash>,
+    /// SHA-256 of the lines "hash, two blanks, name, newline" of all files: of what `sha256sum *` prints.
+    pub input_sha256: String,
+    /// Files that were left out, because they do not count in the input either.
+    pub left_out: Vec<String>,
+    /// The pinhole that the metadata said.
+    pub before: Option<Intrinsics>,
+    /// The pinhole that they say now.
+    pub after: Option<Intrinsics>,
+    /// Frames written.
+    pub n_frames: usize,
+    /// Depth measurements in the input's and in the output's maps.
+    pub n_depths: [u64; 2],
+    /// The input's own `provenance.json`, where it is a corrected recording already.
+    pub previous: Option<Vec<u8>>,
+}
+
+/// How far it has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// Frames done.
+    pub done: usize,
+    /// Frames in all.
+    pub total: usize,
+}
+
+/// Applies the plan to a recording and writes the result. See [`correct_observed`] to be told how far it has come.
+///
+/// Nothing is written for a plan whose needs the recording cannot meet. After an error the sink holds part of the
+/// files and must be dropped.
+pub fn correct<S: Sink>(
+    recording: &Recording,
+    plan: &Plan,
+    sink: &mut S,
+) -> Result<Corrected, Error> {
+    correct_observed(recording, plan, sink, &mut |_| {})
+}
+
+/// As [`correct`]; calls `observer` after every batch of frames.
+pub fn correct_observed<S: Sink>(
+    recording: &Recording,
+    plan: &Plan,
+    sink: &mut S,
+    observer: &mut dyn FnMut(Progress),
+) -> Result<Corrected, Error> {
+    let reference = recording.factory().map(|f| f.intrinsics);
+    let amended = |factory: &Factory| {
+        reference.map(|reference| plan.intrinsics(&factory.intrinsics, &reference))
+    };
+    // One map for all frames of the same metadata, which is nearly always all of them.
+    let usual = Warps::new(recording, plan, recording.factory())?;
+    let total = recording.frames.len();
+    let mut hashes = Vec::new();
+    let mut n_depths = [0; 2];
+    // Batches bound the memory, whatever the number of frames.
+    const BATCH: usize = 16;
+    let indices: Vec<usize> = (0..total).collect();
+    for batch in indices.chunks(BATCH) {
+        let one = |&index: &usize| frame(recording, plan, &usual, index);
+        #[cfg(feature = "parallel")]
+        let done: Vec<Result<Vec<Output>, Error>> = {
+            use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
+            batch.par_iter().map(one).collect()
+        };
+        #[cfg(not(feature = "parallel"))]
+        let done: Vec<Result<Vec<Output>, Error>> = batch.iter().map(one).collect();
+        for outputs in done {
+            for output in outputs? {
+                sink.write(&output.hash.name, &output.bytes)?;
+                n_depths = [0, 1].map(|i| n_depths[i] + output.n_depths[i]);
+                hashes.push(output.hash);
+            }
+        }
+        observer(Progress { done: batch[batch.len() - 1] + 1, total });
+    }
+    let metadata = recording.amended_metadata(|timestamp| {
+        let frame = recording.frames.iter().find(|f| f.timestamp == timestamp);
+        let factory = frame.and_then(|f| f.factory.as_ref()).or(recording.factory());
+        Amendment {
+            intrinsics: factory
+                .and_then(amended)
+                .filter(|k| factory.is_none_or(|f| f.intrinsics != *k)),
+            rectified: plan.lens().is_some(),
+        }
+    })?;
+    for (name, bytes) in &metadata {
+        hashes.push(hash_of(name, &recording.file(name)?));
+        sink.write(name, bytes)?;
+    }
+    let mut left_out = Vec::new();
+    let mut previous = None;
+    let written: std::collections::BTreeSet<String> =
+        hashes.iter().map(|hash| hash.name.clone()).collect();
+    for name in recording.file_names() {
+        if written.contains(name) {
+            continue;
+        }
+        let bytes = recording.file(name)?;
+        hashes.push(hash_of(name, &bytes));
+        if name == PROVENANCE {
+            previous = Some(bytes);
+        } else if recording.is_image_name(name) {
+            left_out.push(name.to_owned());
+        } else {
+            sink.write(name, &bytes)?;
+        }
+    }
+    hashes.sort_by(|a, b| a.name.cmp(&b.name));
+    let lines: String = hashes.iter().map(|h| format!("{}  {}\n", h.sha256, h.name)).collect();
+    Ok(Corrected {
+        input_sha256: hash_of("", lines.as_bytes()).sha256,
+        files: hashes,
+        left_out,
+        before: reference,
+        after: recording.factory().and_then(amended),
+        n_frames: total,
+        n_depths,
+        previous,
+    })
+}
+
+fn hash_of(name: &str, bytes: &[u8]) -> FileHash {
+    let digest = Sha256::digest(bytes);
+    let sha256 = digest.iter().map(|byte| format!("{byte:02x}")).collect();
+    FileHash { name: name.to_owned(), sha256 }
+}
+
+/// A file to write in place of one that was read.
+struct Output {
+    hash: FileHash,
+    bytes: Vec<u8>,
+    /// Depth measurements before and after.
+    n_depths: [u64; 2],
+}
+
+/// What moves the pixels of a frame; `None` where they stay.
+struct Warps {
+    color: Option<ColorWarp>,
+    depth: Option<DepthWarp>,
+}
+
+impl Warps {
+    fn new(recording: &Recording, plan: &Plan, factory: Option<&Factory>) -> Result<Self, Error> {
+        let reference = recording.factory().map(|f| f.intrinsics);
+        let after = factory.zip(reference).map(|(f, r)| plan.intrinsics(&f.intrinsics, &r));
+        let geometry = Geometry::new(plan, factory, after, recording.place())?;
+        let mut warps = Self { color: None, depth: None };
+        if !plan.moves_depth() {
+            return Ok(warps);
+        }
+        let Some(Intrinsics { width, height, .. }) = after else {
+            return Err(Error::Missing {
+                recording: recording.place().to_owned(),
+                step: "shift",
+                what: "factory metadata",
+                remedy: "record with an app that saves them",
+            });
+        };
+        if plan.lens().is_some() {
+            let map = PixelMap::new(width, height, |at| geometry.color_source(at));
+            warps.color = Some(ColorWarp::new(&map));
+        }
+        let map = PixelMap::new(width, height, |at| geometry.depth_source(at));
+        warps.depth = Some(DepthWarp::new(&map, plan.sampling()));
+        Ok(warps)
+    }
+}
+
+/// The files of one frame.
+fn frame(
+    recording: &Recording,
+    plan: &Plan,
+    usual: &Warps,
+    index: usize,
+) -> Result<Vec<Output>, Error> {
+    let source = &recording.frames[index];
+    let own;
+    // Frames of other metadata than the recording's get maps of their own.
+    let warps = match &source.factory {
+        Some(factory) if recording.factory() != Some(factory) && plan.moves_depth() => {
+            own = Warps::new(recording, plan, Some(factory))?;
+            &own
+        }
+        _ => usual,
+    };
+    let mut outputs = Vec::new();
+    if let Some(name) = &source.color {
+        let read = recording.file(name)?;
+        let hash = hash_of(name, &read);
+        let bytes = if plan.changes_color() {
+            color(recording.rgb(index)?, plan, warps).to_png()
+        } else {
+            read
+        };
+        outputs.push(Output { hash, bytes, n_depths: [0; 2] });
+    }
+    if let Some(name) = &source.depth {
+        let read = recording.file(name)?;
+        let hash = hash_of(name, &read);
+        if plan.changes_depth() {
+            let map = recording.depth(index)?;
+            let count =
+                |map: &DepthMap| map.depth_m().iter().filter(|z| !z.is_nan()).count() as u64;
+            let before = count(&map);
+            let map = depth(map, plan, warps);
+            let n_depths = [before, count(&map)];
+            outputs.push(Output { hash, bytes: encode_depth(&map), n_depths });
+        } else {
+            outputs.push(Output { hash, bytes: read, n_depths: [0; 2] });
+        }
+    }
+    Ok(outputs)
+}
+
+fn color(mut image: Rgb, plan: &Plan, warps: &Warps) -> Rgb {
+    if plan.unmirror() == Some(Mirrored::Both) {
+        let pixels = mirrored(image.width(), image.pixels());
+        image = Rgb::new(image.width(), image.height(), pixels);
+    }
+    match &warps.color {
+        Some(warp) => warp.apply(&image),
+        None => image,
+    }
+}
+
+fn depth(mut map: DepthMap, plan: &Plan, warps: &Warps) -> DepthMap {
+    if plan.unmirror().is_some() {
+        let depth_m = mirrored(map.width(), map.depth_m());
+        map = DepthMap::new(map.width(), map.height(), depth_m);
+    }
+    if let Some(warp) = &warps.depth {
+        map = warp.apply(&map);
+    }
+    let (scale, bias_m) = plan.line();
+    if (scale, bias_m) != (1.0, 0.0) {
+        let (factor, bias_m) = (1.0 / scale as f32, bias_m as f32);
+        let depth_m = map.depth_m().iter().map(|z| (z - bias_m) * factor).collect();
+        map = DepthMap::new(map.width(), map.height(), depth_m);
+    }
+    map
+}

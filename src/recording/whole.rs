@@ -1,0 +1,148 @@
+//! A folder that comes to be as a whole or not at all.
+
+use std::{
+    fs::{self, File},
+    io,
+    path::{Component, Path, PathBuf},
+};
+
+use super::{Error, Sink, folder::file_error};
+
+/// A folder written under another name beside its place, and renamed when it is whole.
+///
+/// Whoever is killed on the way leaves a hidden folder `.NAME.PID.partial`, never half a folder NAME; the next
+/// `WholeFolder` of the same name removes it. Dropped without [`commit`](Self::commit), it leaves nothing.
+#[derive(Debug)]
+pub struct WholeFolder {
+    target: PathBuf,
+    partial: PathBuf,
+    /// Held as long as this process is at work: a partial folder whose lock is free is nobody's.
+    lock: Option<File>,
+    files: Vec<PathBuf>,
+}
+
+const LOCK: &str = ".lock";
+const PARTIAL: &str = ".partial";
+
+impl WholeFolder {
+    /// A folder to be, at `target`. Refused where that is there already, unless it is an empty folder.
+    pub fn create(target: &Path) -> Result<Self, Error> {
+        let fail = |why: &str| Error::File { file: target.display().to_string(), why: why.into() };
+        let name = target
+            .file_name()
+            .and_then(|name| name.to_str())
+            .ok_or_else(|| fail("names no folder; name a new one"))?;
+        refuse_unless_free(target)?;
+        let parent = match target.parent() {
+            Some(parent) if parent != Path::new("") => parent.to_owned(),
+            _ => PathBuf::from("."),
+        };
+        fs::create_dir_all(&parent).map_err(|e| file_error(&parent, &e))?;
+        remove_leftovers(&parent, name);
+        let partial = parent.join(format!(".{name}.{}{PARTIAL}", std::process::id()));
+        fs::create_dir(&partial).map_err(|e| file_error(&partial, &e))?;
+        let mut folder = Self { target: target.to_owned(), partial, lock: None, files: Vec::new() };
+        let lock = folder.partial.join(LOCK);
+        let file = File::create_new(&lock).map_err(|e| file_error(&lock, &e))?;
+        // Where the file system knows no locks, leftovers stay.
+        let _ = file.try_lock();
+        folder.lock = Some(file);
+        Ok(folder)
+    }
+
+    /// Brings everything to the disk and gives the folder its name.
+    pub fn commit(mut self) -> Result<(), Error> {
+        for path in &self.files {
+            // Writing has begun long ago; this waits for the rest of it.
+            File::open(path).and_then(|file| file.sync_all()).map_err(|e| file_error(path, &e))?;
+        }
+        sync_folder(&self.partial).map_err(|e| file_error(&self.partial, &e))?;
+        refuse_unless_free(&self.target)?;
+        if cfg!(windows) && self.target.exists() {
+            fs::remove_dir(&self.target).map_err(|e| file_error(&self.target, &e))?;
+        }
+        fs::rename(&self.partial, &self.target).map_err(|e| file_error(&self.target, &e))?;
+        // The lock goes last, so that a folder without one is never at work; hidden, it does no harm if it stays.
+        self.lock = None;
+        let _ = fs::remove_file(self.target.join(LOCK));
+        if let Some(parent) = self.partial.parent() {
+            // The name is there; that it is on the disk as well is beyond what some file systems promise.
+            let _ = sync_folder(parent);
+        }
+        Ok(())
+    }
+}
+
+impl Sink for WholeFolder {
+    fn write(&mut self, name: &str, bytes: &[u8]) -> Result<(), Error> {
+        let inside = Path::new(name);
+        let path = self.partial.join(inside);
+        if name == LOCK || !inside.components().all(|part| matches!(part, Component::Normal(_))) {
+            let why = "not a name of a file inside a folder".to_owned();
+            return Err(Error::File { file: name.to_owned(), why });
+        }
+        if let Some(folder) = path.parent() {
+            fs::create_dir_all(folder).map_err(|e| file_error(folder, &e))?;
+        }
+        fs::write(&path, bytes).map_err(|e| file_error(&path, &e))?;
+        self.files.push(path);
+        Ok(())
+    }
+}
+
+impl Drop for WholeFolder {
+    fn drop(&mut self) {
+        if self.lock.take().is_some() {
+            // After an error; what cannot be removed now, the next run removes.
+            let _ = fs::remove_dir_all(&self.partial);
+        }
+    }
+}
+
+fn refuse_unless_free(target: &Path) -> Result<(), Error> {
+    let refuse =
+        |why: &str| Err(Error::File { file: target.display().to_string(), why: why.to_owned() });
+    match fs::symlink_metadata(target) {
+        Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(()),
+        Err(e) => Err(file_error(target, &e)),
+        Ok(there) if !there.is_dir() => refuse("it is there already; name a new folder"),
+        Ok(_) => {
+            let mut entries = fs::read_dir(target).map_err(|e| file_error(target, &e))?;
+            match entries.next() {
+                None => Ok(()),
+                Some(_) => refuse("the folder is not empty; name a new one"),
+            }
+        }
+    }
+}
+
+/// Removes what killed runs have left of a folder of this name.
+fn remove_leftovers(parent: &Path, name: &str) {
+    let Ok(entries) = fs::read_dir(parent) else { return };
+    for path in entries.flatten().map(|entry| entry.path()) {
+        let pid = path
+            .file_name()
+            .and_then(|file| file.to_str())
+            .and_then(|file| file.strip_prefix('.')?.strip_prefix(name))
+            .and_then(|rest| rest.strip_prefix('.')?.strip_suffix(PARTIAL));
+        if !pid.is_some_and(|pid| !pid.is_empty() && pid.bytes().all(|b| b.is_ascii_digit())) {
+            continue;
+        }
+        let _ = match File::open(path.join(LOCK)) {
+            Ok(lock) if lock.try_lock().is_ok() => fs::remove_dir_all(&path),
+            Ok(_) => Ok(()),
+            // Killed, or about to go on, between making the folder and its lock: then it is empty.
+            Err(_) => fs::remove_dir(&path),
+        };
+    }
+}
+
+#[cfg(unix)]
+fn sync_folder(path: &Path) -> io::Result<()> {
+    File::open(path)?.sync_all()
+}
+
+#[cfg(not(unix))]
+fn sync_folder(_: &Path) -> io::Result<()> {
+    Ok(())
+}

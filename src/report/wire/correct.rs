@@ -1,0 +1,205 @@
+//! What was corrected: `provenance.json`.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::{Audit, FindingInfo, finite};
+use crate::{
+    camera::{Camera, Intrinsics},
+    correct::{self, Because, Corrected, Lens, Plan, Sampling, Step},
+    diagnose::{self, Code, DistortionState},
+    recording::Recording,
+    report::Error,
+};
+
+/// What was corrected, and from what.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Correct {
+    /// Name of the input.
+    pub recording: String,
+    /// Version of truedepth.
+    pub version: String,
+    /// SHA-256 of what `sha256sum *` prints in the input's folder.
+    pub input_sha256: String,
+    /// What was done, and why.
+    pub steps: Vec<StepInfo>,
+    /// `edge-aware` or `nearest`.
+    pub depth_sampling: String,
+    /// The pinhole that the metadata said.
+    pub factory_before: Option<PinholeInfo>,
+    /// The pinhole that they say now.
+    pub factory_after: Option<PinholeInfo>,
+    /// Frames written.
+    pub n_frames: usize,
+    /// Depth measurements in all depth maps that were rewritten, before and after.
+    pub n_depths: [u64; 2],
+    /// Files of the input that were left out, because they do not count there either.
+    pub left_out: Vec<String>,
+    /// The findings that asked for it; empty where no audit did.
+    pub findings: Vec<FindingInfo>,
+    /// Every file of the input.
+    pub files: BTreeMap<String, String>,
+    /// What the input's own `provenance.json` said, where it was a corrected recording already.
+    pub previous: Option<serde_json::Value>,
+}
+
+/// One step.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StepInfo {
+    /// `scale-intrinsics`, `focal`, `center`, `undistort`, `mirror`, `zoom`, `shift` or `depth`.
+    pub step: String,
+    /// Code of a finding, `camera`, `told` or `equations`.
+    pub because: String,
+    /// What the step took its shape from, where that is no number: `own_tables`, `own_tables_twice`, `tables`,
+    /// `camera`, `both`, `depth`.
+    pub how: Option<String>,
+    /// Its parameters, by name.
+    pub parameters: BTreeMap<String, f64>,
+}
+
+/// A pinhole.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PinholeInfo {
+    /// Focal lengths.
+    pub focal_xy_px: [f64; 2],
+    /// Principal point.
+    pub principal_point_px: [f64; 2],
+    /// Columns and rows.
+    pub image_size_px: [usize; 2],
+}
+
+impl Correct {
+    /// What was done to `recording` by `plan`, which the faults among `findings` asked for.
+    pub fn new(
+        recording: &Recording,
+        plan: &Plan,
+        done: &Corrected,
+        findings: Vec<FindingInfo>,
+    ) -> Self {
+        let previous = done.previous.as_ref().map(|bytes| {
+            let text = String::from_utf8_lossy(bytes);
+            serde_json::from_str(&text).unwrap_or_else(|_| serde_json::Value::from(text.as_ref()))
+        });
+        Self {
+            recording: recording.name.clone(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            input_sha256: done.input_sha256.clone(),
+            steps: plan.steps().iter().map(StepInfo::from).collect(),
+            depth_sampling: plan.sampling().name().to_owned(),
+            factory_before: done.before.as_ref().map(PinholeInfo::from),
+            factory_after: done.after.as_ref().map(PinholeInfo::from),
+            n_frames: done.n_frames,
+            n_depths: done.n_depths,
+            left_out: done.left_out.clone(),
+            findings,
+            files: done.files.iter().map(|f| (f.name.clone(), f.sha256.clone())).collect(),
+            previous,
+        }
+    }
+}
+
+impl From<&(Step, Because)> for StepInfo {
+    fn from((step, because): &(Step, Because)) -> Self {
+        let camera = |camera: &Camera| {
+            let k = &camera.intrinsics;
+            let mut numbers =
+                vec![("fx_px", k.fx), ("fy_px", k.fy), ("cx_px", k.cx), ("cy_px", k.cy)];
+            if let crate::camera::Distortion::Brown(lens) = &camera.distortion {
+                let [k1, k2, p1, p2, k3] = lens.parameters();
+                numbers.extend([("k1", k1), ("k2", k2), ("p1", p1), ("p2", p2), ("k3", k3)]);
+            }
+            numbers
+        };
+        let (how, parameters) = match step {
+            Step::ScaleIntrinsics { factor: [x, y] } => {
+                (None, vec![("factor_x", *x), ("factor_y", *y)])
+            }
+            Step::Focal { focal_px } => (None, vec![("focal_px", *focal_px)]),
+            Step::Center { center_px: [x, y] } => (None, vec![("cx_px", *x), ("cy_px", *y)]),
+            Step::Undistort(Lens::OwnTables) => (Some("own_tables"), Vec::new()),
+            Step::Undistort(Lens::OwnTablesTwice) => (Some("own_tables_twice"), Vec::new()),
+            Step::Undistort(Lens::Tables(_)) => (Some("tables"), Vec::new()),
+            Step::Undistort(Lens::Camera(own)) => (Some("camera"), camera(own)),
+            Step::Unmirror(what) => (Some(what.name()), Vec::new()),
+            Step::DepthZoom { zoom: [x, y] } => (None, vec![("zoom_x", *x), ("zoom_y", *y)]),
+            Step::DepthShift { shift_px: [x, y] } => {
+                (None, vec![("shift_x_px", *x), ("shift_y_px", *y)])
+            }
+            Step::Depth { scale, bias_m } => {
+                (None, vec![("scale", *scale), ("bias_mm", 1e3 * bias_m)])
+            }
+            _ => (None, Vec::new()),
+        };
+        Self {
+            step: step.name().to_owned(),
+            because: because.name().to_owned(),
+            how: how.map(str::to_owned),
+            parameters: parameters
+                .into_iter()
+                .filter_map(|(name, value)| Some((name.to_owned(), finite(value)?)))
+                .collect(),
+        }
+    }
+}
+
+impl From<&Intrinsics> for PinholeInfo {
+    fn from(k: &Intrinsics) -> Self {
+        Self {
+            focal_xy_px: [k.fx, k.fy],
+            principal_point_px: [k.cx, k.cy],
+            image_size_px: [k.width, k.height],
+        }
+    }
+}
+
+impl Audit {
+    /// The findings that are faults.
+    pub fn faults(&self) -> impl Iterator<Item = &FindingInfo> {
+        self.findings.iter().filter(|f| f.severity == diagnose::Verdict::Fault.name())
+    }
+
+    /// The plan that the faults of this audit call for.
+    ///
+    /// Errors: a finding of a newer version, a camera that cannot be, a fault that names no way back.
+    pub fn plan(&self, sampling: Sampling) -> Result<Plan, Error> {
+        let camera = self.calibration.as_ref().map(|c| c.camera()).transpose()?;
+        let mut findings = Vec::new();
+        for finding in self.faults() {
+            let Some(correction) = &finding.correction else { continue };
+            let code: Code =
+                finding.code.parse().map_err(|e| Error::Document(format!("{e}")))?;
+            let number = |name: &str| {
+                correction.parameters.get(name).copied().ok_or_else(|| {
+                    Error::Document(format!("{code}: its correction lacks `{name}`"))
+                })
+            };
+            let correction = match correction.kind.as_str() {
+                "focal" => diagnose::Correction::Focal { focal_px: number("focal_px")? },
+                "undistort" => diagnose::Correction::Undistort {
+                    tables: self.tables().transpose()?.map(Box::new),
+                },
+                "depth" => diagnose::Correction::Depth {
+                    scale: number("scale")?,
+                    bias_m: number("bias_mm")? / 1e3,
+                },
+                "unmirror" => diagnose::Correction::Unmirror,
+                "scale_intrinsics" => diagnose::Correction::ScaleIntrinsics {
+                    factor: [number("factor_x")?, number("factor_y")?],
+                },
+                other => {
+                    return Err(Error::Document(format!("{code}: no correction is called `{other}`")));
+                }
+            };
+            findings.push((code, correction));
+        }
+        let state = match self.distortion_state.as_str() {
+            "rectified_twice" => DistortionState::RectifiedTwice,
+            "distorted" => DistortionState::Distorted,
+            "rectified" => DistortionState::Rectified,
+            _ => DistortionState::Unknown,
+        };
+        correct::Plan::from_findings(&findings, state, camera.as_ref(), sampling)
+            .map_err(|e| Error::Document(e.to_string()))
+    }
+}
