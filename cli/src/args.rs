@@ -1,10 +1,13 @@
 //! What was typed.
 
+mod correct;
 mod paper;
 
 use std::path::PathBuf;
 
 use clap::{Parser, Subcommand, ValueEnum, builder::PossibleValuesParser};
+use correct::CORRECT_EXAMPLES;
+pub(crate) use correct::{CorrectArgs, SamplingChoice, Steps};
 use paper::{COMPARE_EXAMPLES, INSPECT_EXAMPLES};
 pub(crate) use paper::{CompareArgs, InspectArgs};
 use truedepth::{
@@ -146,6 +149,19 @@ pub(crate) enum Command {
     /// faults are found.
     #[command(after_help = DEMO_EXAMPLES)]
     Demo(DemoArgs),
+
+    /// Apply corrections and write a true recording, with provenance; never in place
+    ///
+    /// Without --with, --fault, --av or --ar it audits first and removes what the audit calls a fault. Writes the same
+    /// format: images resampled at most once, metadata with all keys, every other file as it is, and provenance.json
+    /// (version, hashes of the input, findings, steps with their parameters).
+    ///
+    /// Depth is resampled without ever blending across holes or edges. The output appears as a whole or not at all.
+    ///
+    /// Exits with 0, also where there was nothing to correct (then nothing is written, unless --always); with 1 where
+    /// it could not.
+    #[command(after_help = CORRECT_EXAMPLES)]
+    Correct(CorrectArgs),
 
     /// Print the board: a PDF, SVG or PNG true to scale, and the board.toml for recordings of it
     ///

@@ -182,6 +182,12 @@ fn text_of(path: &Path) -> Result<String, Failure> {
     fs::read_to_string(path).map_err(|e| unreadable(path, e))
 }
 
+/// A document that some verb wrote.
+pub(crate) fn document(path: &Path) -> Result<Document, Failure> {
+    let within = |failure: Failure| failure.within(format!("cannot use {}", path.display()));
+    Document::from_json(&text_of(path)?).map_err(|e| within(e.into()))
+}
+
 /// The camera that `truedepth calibrate --json` or `audit --json` wrote.
 pub(crate) fn camera(path: &Path) -> Result<Camera, Failure> {
     let hint = "give what `truedepth calibrate REC --json` printed, or the report.json of an audit that calibrated";

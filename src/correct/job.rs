@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// What is written beside the corrected files; never carried over as an ordinary file.
-pub const PROVENANCE: &str = "provenance.json";
+const PROVENANCE: &str = "provenance.json";
 
 /// A file of the input and its SHA-256.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -110,6 +110,21 @@ impl Step {
         }
     }
 
+    /// What rectifies distorted images: the recording's own tables where it has them, else the camera's distortion.
+    pub fn undistort(has_tables: bool, camera: Option<&Camera>) -> Result<Self, Error> {
+        if has_tables {
+            return Ok(Self::Undistort(Lens::OwnTables));
+        }
+        let lens = camera.filter(|c| c.distortion != Distortion::None).ok_or_else(|| {
+            Error::NoWay(
+                "the images are distorted, but the recording has no lookup tables, and the model that was calibrated \
+                 has no distortion; give a calibration that has one with --with"
+                    .to_owned(),
+            )
+        })?;
+        Ok(Self::Undistort(Lens::Camera(Box::new(lens.clone()))))
+    }
+
     fn check(&self) -> Result<(), Error> {
         let require = |valid: bool, value: String, range: &'static str| match valid {
             true => Ok(()),
@@ -199,44 +214,87 @@ impl Plan {
         sampling: Sampling,
     ) -> Result<Self, Error> {
         let mut steps: Vec<(Step, Because)> = Vec::new();
-        let mut line: Option<(f64, f64, Code)> = None;
         for (code, correction) in findings {
-            let step = match correction {
-                Correction::Focal { focal_px } => Step::Focal { focal_px: *focal_px },
-                Correction::ScaleIntrinsics { factor } => Step::ScaleIntrinsics { factor: *factor },
-                Correction::Unmirror => Step::Unmirror(Mirrored::Both),
-                Correction::Undistort { tables: Some(_) } => Step::Undistort(Lens::OwnTables),
-                Correction::Undistort { tables: None } => {
-                    let lens = camera.filter(|c| c.distortion != Distortion::None);
-                    let Some(camera) = lens else {
-                        return Err(Error::NoWay(format!(
-                            "{code}: the images are distorted, but the recording has no lookup tables, and the model \
-                             that was calibrated has no distortion; give a calibration that has one with --with"
-                        )));
-                    };
-                    Step::Undistort(Lens::Camera(Box::new(camera.clone())))
+            let because = Because::Finding(*code);
+            match correction {
+                Correction::Focal { focal_px } => {
+                    steps.push((Step::Focal { focal_px: *focal_px }, because));
+                }
+                Correction::PrincipalPoint { center_px } => {
+                    steps.push((Step::Center { center_px: *center_px }, because));
+                }
+                Correction::ScaleIntrinsics { factor } => {
+                    steps.push((Step::ScaleIntrinsics { factor: *factor }, because));
+                }
+                Correction::Unmirror => steps.push((Step::Unmirror(Mirrored::Both), because)),
+                Correction::UnmirrorDepth => steps.push((Step::Unmirror(Mirrored::Depth), because)),
+                Correction::Undistort { tables } => {
+                    steps.push((Step::undistort(tables.is_some(), camera)?, because));
+                }
+                Correction::Align { zoom, shift_px } => {
+                    steps.push((Step::DepthZoom { zoom: [*zoom; 2] }, because.clone()));
+                    steps.push((Step::DepthShift { shift_px: *shift_px }, because));
                 }
                 Correction::Depth { scale, bias_m } => {
-                    // TD301 tells the scale, TD302 the bias; sensor = scale·truth + bias takes both.
-                    let (s, b, _) = line.unwrap_or((1.0, 0.0, *code));
-                    line = Some((s * scale, b + bias_m, *code));
-                    continue;
+                    steps.push((Step::Depth { scale: *scale, bias_m: *bias_m }, because));
                 }
-            };
-            steps.push((step, Because::Finding(*code)));
-        }
-        if let Some((scale, bias_m, code)) = line {
-            steps.push((Step::Depth { scale, bias_m }, Because::Finding(code)));
+            }
         }
         if state == DistortionState::RectifiedTwice {
             let twice = Step::Undistort(Lens::OwnTablesTwice);
             steps.push((twice, Because::Finding(Code::TD203)));
         }
-        // A calibrated camera brings its own focal length.
-        if steps.iter().any(|(step, _)| matches!(step, Step::Undistort(Lens::Camera(_)))) {
-            steps.retain(|(step, _)| !matches!(step, Step::Focal { .. } | Step::Center { .. }));
+        Self::merged(steps, sampling)
+    }
+
+    /// As [`because`](Self::because), for steps that several findings have contributed to: scales and zooms multiply,
+    /// biases and shifts add, what changes nothing goes, and a calibrated camera's own pinhole goes before others.
+    /// Where a finding calls for mirroring depth alone, what findings say of depth otherwise is dropped: audit the
+    /// result.
+    pub fn merged(steps: Vec<(Step, Because)>, sampling: Sampling) -> Result<Self, Error> {
+        let mut merged: Vec<(Step, Because)> = Vec::new();
+        let brings_pinhole =
+            steps.iter().any(|(step, _)| matches!(step, Step::Undistort(Lens::Camera(_))));
+        for (step, because) in steps {
+            if brings_pinhole && matches!(step, Step::Focal { .. } | Step::Center { .. }) {
+                continue;
+            }
+            let same = merged.iter_mut().find(|(other, _)| other.name() == step.name());
+            match (same, &step) {
+                (Some((Step::Depth { scale, bias_m }, _)), Step::Depth { scale: s, bias_m: b }) => {
+                    *scale *= s;
+                    *bias_m += b;
+                }
+                (Some((Step::DepthZoom { zoom: [x, y] }, _)), Step::DepthZoom { zoom: [u, v] }) => {
+                    *x *= u;
+                    *y *= v;
+                }
+                (
+                    Some((Step::DepthShift { shift_px: [x, y] }, _)),
+                    Step::DepthShift { shift_px: [u, v] },
+                ) => {
+                    *x += u;
+                    *y += v;
+                }
+                _ => merged.push((step, because)),
+            }
         }
-        Self::because(steps, sampling)
+        // Read through mirrored depth maps, nothing else of them was measured: a second audit does that.
+        let unread = merged
+            .iter()
+            .any(|(s, b)| matches!((s, b), (Step::Unmirror(Mirrored::Depth), Because::Finding(_))));
+        merged.retain(|(step, because)| match step {
+            Step::DepthZoom { .. } | Step::DepthShift { .. } | Step::Depth { .. }
+                if unread && matches!(because, Because::Finding(_)) =>
+            {
+                false
+            }
+            Step::DepthZoom { zoom } => *zoom != [1.0; 2],
+            Step::DepthShift { shift_px } => *shift_px != [0.0; 2],
+            Step::Depth { scale, bias_m } => (*scale, *bias_m) != (1.0, 0.0),
+            _ => true,
+        });
+        Self::because(merged, sampling)
     }
 
     /// What makes the recording one of this camera: its pinhole in the metadata, its distortion out of the images.
@@ -454,12 +512,20 @@ mod tests {
             focal,
             (Code::TD301, Correction::Depth { scale: 1.02, bias_m: 0.0 }),
             (Code::TD302, Correction::Depth { scale: 1.0, bias_m: 0.004 }),
+            (Code::TD401, Correction::Align { zoom: 0.95, shift_px: [0.0; 2] }),
+            (Code::TD402, Correction::Align { zoom: 1.0, shift_px: [3.0, -1.0] }),
         ];
+        let mut mirrored = depth.to_vec();
+        mirrored.push((Code::TD403, Correction::UnmirrorDepth));
+        let unread = plan(&mirrored, DistortionState::Rectified, None).unwrap();
+        let names: Vec<&str> = unread.steps().iter().map(|(step, _)| step.name()).collect();
+        assert_eq!(names, ["focal", "mirror"]);
         let plan = plan(&depth, DistortionState::RectifiedTwice, None).unwrap();
         assert_eq!(plan.line(), (1.02, 0.004));
         assert_eq!(plan.lens(), Some(&Lens::OwnTablesTwice));
         let names: Vec<&str> = plan.steps().iter().map(|(step, _)| step.name()).collect();
-        assert_eq!(names, ["focal", "depth", "undistort"]);
+        assert_eq!(names, ["focal", "depth", "zoom", "shift", "undistort"]);
+        assert_eq!((plan.zoom(), plan.shift_px()), ([0.95; 2], [3.0, -1.0]));
     }
 
     #[test]

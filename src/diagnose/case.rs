@@ -82,6 +82,11 @@ impl<'a> Case<'a> {
             own_views: &[],
             factory_depth: None,
             own_depth: None,
+            registration: None,
+            distortion: None,
+            steps: &[],
+            t_ns: &[],
+            handedness: None,
             tolerances,
         }
     }

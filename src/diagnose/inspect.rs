@@ -15,8 +15,8 @@ pub struct Inspection<'a> {
     pub sheet: Option<Sheet>,
     /// Which known device it is; `None` without a sheet.
     pub identity: Option<Identity<'a>>,
-    /// By code: TD101, TD5xx as an audit would find them, and TD201, TD203, TD502 as *warning* where the registry or the
-    /// metadata give reason to expect a fault that only an audit can measure.
+    /// By code: TD101, TD5xx as an audit would find them, and TD201, TD203, TD401 as *warning* where the registry or
+    /// the metadata give reason to expect a fault that only an audit can measure.
     pub findings: Vec<Finding>,
 }
 
@@ -59,7 +59,7 @@ fn expected(identity: &Identity<'_>) -> Vec<Finding> {
         .iter()
         .map(|issue| {
             let (code, unit) = match issue {
-                KnownIssue::DepthZoom => (Code::TD502, Unit::Percent),
+                KnownIssue::DepthZoom => (Code::TD401, Unit::Percent),
                 KnownIssue::FocalLength => (Code::TD201, Unit::Percent),
                 KnownIssue::NotRectified => (Code::TD203, Unit::Px),
             };

@@ -1,4 +1,4 @@
-//! Two sets of factory parameters of one device against each other: AVFoundation's and ARKit's, or the same API's twice.
+//! Two sets of factory parameters of one device against each other: AVFoundation's and ARKit's, or one API's twice.
 //!
 //! The paper's tables, their derived columns, and both of its corrections:
 //!
@@ -158,8 +158,8 @@ fn changed(first: &Side, second: &Side, same: &SameApi) -> Finding {
             first.sheet.focal_px, second.sheet.focal_px
         );
         finding.what_to_do = "Keep the metadata with each recording and use its own: the paper saw such a change with \
-                              an update of the system, 3 px at the reference dimensions for two devices. It is no sign \
-                              that either value is right."
+                              an update of the system, and an iPhone shows one from recording to recording. It is no \
+                              sign that either value is right."
             .to_owned();
     }
     finding
@@ -195,8 +195,8 @@ fn references(av: &Sheet, ar: &Sheet, across: &AcrossApis) -> Finding {
                  (issue 1 of the paper)."
             );
             finding.what_to_do = format!(
-                "Zoom ARKit's depth maps by {zoom:.4} about the principal point: `truedepth correct REC --zoom \
-                 {zoom:.4}`. AVFoundation's are aligned."
+                "Zoom ARKit's depth maps by {zoom:.4} about the principal point: `truedepth correct REC \
+                 --fault depth-zoom={zoom:.4}`. AVFoundation's are aligned."
             );
         }
         Some(_) => {

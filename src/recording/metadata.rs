@@ -216,6 +216,10 @@ impl DepthRecord {
                 return Ok((Some(center), None));
             }
         };
+        // Tables of nothing but zeros are what a rectified recording says (ours do, `Amendment`): no table.
+        if forward.iter().chain(inverse).all(|&m| m == 0.0) {
+            return Ok((Some(center), None));
+        }
         let radius = RadialTable::farthest_corner_px(center, size[0], size[1]);
         let table = |key, samples: &[f64]| {
             // Apple's own reach 0.15 at the corner of the widest lens.

@@ -36,13 +36,19 @@ impl Recording {
             if !self.file_names().contains(&file) {
                 continue;
             }
-            let mut records: Vec<Record> = json::records(&self.path(file), &self.file(file)?)?;
-            for record in &mut records {
-                let Some(timestamp) = record.timestamp() else { continue };
-                record.amend(&amend(timestamp));
+            let bytes = self.file(file)?;
+            let mut text = String::with_capacity(bytes.len() + 4);
+            let records: Vec<Record> = json::records(&self.path(file), &bytes)?;
+            drop(bytes);
+            for mut record in records {
+                if let Some(timestamp) = record.timestamp() {
+                    record.amend(&amend(timestamp));
+                }
+                text.push_str(if text.is_empty() { "[\n" } else { "," });
+                text.push_str(&record.to_text());
             }
-            let records: Vec<String> = records.iter().map(Record::to_text).collect();
-            files.push((file, format!("[\n{}\n]\n", records.join(",")).into_bytes()));
+            text.push_str(if text.is_empty() { "[\n]\n" } else { "\n]\n" });
+            files.push((file, text.into_bytes()));
         }
         Ok(files)
     }
@@ -140,6 +146,7 @@ mod tests {
                     \"Alpha \\\"q\\\"\" : 6.7641117311723065e-06,\n  \"Timestamp\" : 500\n}\n]\n";
         memory.insert(DEPTH_METADATA, text);
         let recording = Recording::from_source(Arc::new(memory), &Limits::default()).unwrap();
+        assert!(recording.factory().unwrap().tables.is_some());
         let files = recording.amended_metadata(|_| Amendment::default()).unwrap();
         assert_eq!(files[0].0, DEPTH_METADATA);
         assert_eq!(std::str::from_utf8(&files[0].1).unwrap(), text);

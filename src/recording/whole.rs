@@ -10,7 +10,7 @@ use super::{Error, Sink, folder::file_error};
 
 /// A folder written under another name beside its place, and renamed when it is whole.
 ///
-/// Whoever is killed on the way leaves a hidden folder `.NAME.PID.partial`, never half a folder NAME; the next
+/// Whoever is killed on the way leaves a hidden folder `.NAME.0.partial`, never half a folder NAME; the next
 /// `WholeFolder` of the same name removes it. Dropped without [`commit`](Self::commit), it leaves nothing.
 #[derive(Debug)]
 pub struct WholeFolder {
@@ -39,8 +39,15 @@ impl WholeFolder {
         };
         fs::create_dir_all(&parent).map_err(|e| file_error(&parent, &e))?;
         remove_leftovers(&parent, name);
-        let partial = parent.join(format!(".{name}.{}{PARTIAL}", std::process::id()));
-        fs::create_dir(&partial).map_err(|e| file_error(&partial, &e))?;
+        // Whoever is at work on the same name has a number of its own.
+        let partial = (0..1000)
+            .map(|n| parent.join(format!(".{name}.{n}{PARTIAL}")))
+            .find_map(|partial| match fs::create_dir(&partial) {
+                Err(e) if e.kind() == io::ErrorKind::AlreadyExists => None,
+                Err(e) => Some(Err(file_error(&partial, &e))),
+                Ok(()) => Some(Ok(partial)),
+            })
+            .unwrap_or_else(|| Err(fail("too many runs are writing it; wait for them")))?;
         let mut folder = Self { target: target.to_owned(), partial, lock: None, files: Vec::new() };
         let lock = folder.partial.join(LOCK);
         let file = File::create_new(&lock).map_err(|e| file_error(&lock, &e))?;
@@ -120,19 +127,19 @@ fn refuse_unless_free(target: &Path) -> Result<(), Error> {
 fn remove_leftovers(parent: &Path, name: &str) {
     let Ok(entries) = fs::read_dir(parent) else { return };
     for path in entries.flatten().map(|entry| entry.path()) {
-        let pid = path
+        let number = path
             .file_name()
             .and_then(|file| file.to_str())
             .and_then(|file| file.strip_prefix('.')?.strip_prefix(name))
             .and_then(|rest| rest.strip_prefix('.')?.strip_suffix(PARTIAL));
-        if !pid.is_some_and(|pid| !pid.is_empty() && pid.bytes().all(|b| b.is_ascii_digit())) {
+        if !number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit())) {
             continue;
         }
         let _ = match File::open(path.join(LOCK)) {
             Ok(lock) if lock.try_lock().is_ok() => fs::remove_dir_all(&path),
             Ok(_) => Ok(()),
-            // Killed, or about to go on, between making the folder and its lock: then it is empty.
-            Err(_) => fs::remove_dir(&path),
+            // Killed between making the folder and its lock, or while removing somebody's leftovers.
+            Err(_) => fs::remove_dir_all(&path),
         };
     }
 }

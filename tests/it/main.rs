@@ -4,6 +4,7 @@
 
 mod calibrate;
 mod coverage;
+mod correct;
 mod detect;
 mod photos;
 mod real_alignment;

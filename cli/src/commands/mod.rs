@@ -5,6 +5,7 @@ mod board;
 mod calibrate;
 mod compare;
 mod completions;
+mod correct;
 mod demo;
 mod detect;
 mod explain;
@@ -32,6 +33,7 @@ pub(crate) fn dispatch(args: Args, terminal: &Terminal) -> Result<Outcome, Failu
         Command::Board(args) => board::run(&args, terminal),
         Command::Inspect(args) => inspect::run(&args, terminal),
         Command::Compare(args) => compare::run(&args, terminal),
+        Command::Correct(args) => correct::run(&args, terminal),
         Command::Calibrate(args) => calibrate::run(&args, terminal),
         Command::Demo(args) => demo::run(&args, terminal),
         Command::Simulate(args) => simulate::run(&args, terminal),

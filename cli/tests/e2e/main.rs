@@ -4,6 +4,7 @@ mod audit;
 mod bad_input;
 mod board;
 mod calibrate;
+mod correct;
 mod detect;
 mod scratch;
 mod usage;

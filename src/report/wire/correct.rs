@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::{Audit, FindingInfo, finite};
 use crate::{
     camera::{Camera, Intrinsics},
-    correct::{self, Because, Corrected, Lens, Plan, Sampling, Step},
+    correct::{self, Because, Corrected, Lens, Mirrored, Plan, Sampling, Step},
     diagnose::{self, Code, DistortionState},
     recording::Recording,
     report::Error,
@@ -129,7 +129,6 @@ impl From<&(Step, Because)> for StepInfo {
             Step::Depth { scale, bias_m } => {
                 (None, vec![("scale", *scale), ("bias_mm", 1e3 * bias_m)])
             }
-            _ => (None, Vec::new()),
         };
         Self {
             step: step.name().to_owned(),
@@ -164,42 +163,46 @@ impl Audit {
     /// Errors: a finding of a newer version, a camera that cannot be, a fault that names no way back.
     pub fn plan(&self, sampling: Sampling) -> Result<Plan, Error> {
         let camera = self.calibration.as_ref().map(|c| c.camera()).transpose()?;
-        let mut findings = Vec::new();
+        let has_tables = self.device.factory.is_some_and(|factory| factory.has_tables);
+        let unusable = |e: correct::Error| Error::Document(e.to_string());
+        let mut steps = Vec::new();
         for finding in self.faults() {
             let Some(correction) = &finding.correction else { continue };
-            let code: Code =
-                finding.code.parse().map_err(|e| Error::Document(format!("{e}")))?;
+            let code: Code = finding.code.parse().map_err(|e| Error::Document(format!("{e}")))?;
             let number = |name: &str| {
                 correction.parameters.get(name).copied().ok_or_else(|| {
                     Error::Document(format!("{code}: its correction lacks `{name}`"))
                 })
             };
-            let correction = match correction.kind.as_str() {
-                "focal" => diagnose::Correction::Focal { focal_px: number("focal_px")? },
-                "undistort" => diagnose::Correction::Undistort {
-                    tables: self.tables().transpose()?.map(Box::new),
-                },
-                "depth" => diagnose::Correction::Depth {
-                    scale: number("scale")?,
-                    bias_m: number("bias_mm")? / 1e3,
-                },
-                "unmirror" => diagnose::Correction::Unmirror,
-                "scale_intrinsics" => diagnose::Correction::ScaleIntrinsics {
+            let called = match correction.kind.as_str() {
+                "focal" => vec![Step::Focal { focal_px: number("focal_px")? }],
+                "undistort" => {
+                    vec![Step::undistort(has_tables, camera.as_ref()).map_err(unusable)?]
+                }
+                "depth" => {
+                    vec![Step::Depth { scale: number("scale")?, bias_m: number("bias_mm")? / 1e3 }]
+                }
+                "align" => vec![
+                    Step::DepthZoom { zoom: [number("zoom")?; 2] },
+                    Step::DepthShift { shift_px: [number("shift_x_px")?, number("shift_y_px")?] },
+                ],
+                "unmirror" => vec![Step::Unmirror(Mirrored::Both)],
+                "unmirror_depth" => vec![Step::Unmirror(Mirrored::Depth)],
+                "scale_intrinsics" => vec![Step::ScaleIntrinsics {
                     factor: [number("factor_x")?, number("factor_y")?],
-                },
+                }],
                 other => {
-                    return Err(Error::Document(format!("{code}: no correction is called `{other}`")));
+                    return Err(Error::Document(format!(
+                        "{code}: no correction is called `{other}`"
+                    )));
                 }
             };
-            findings.push((code, correction));
+            steps.extend(called.into_iter().map(|step| (step, Because::Finding(code))));
         }
-        let state = match self.distortion_state.as_str() {
-            "rectified_twice" => DistortionState::RectifiedTwice,
-            "distorted" => DistortionState::Distorted,
-            "rectified" => DistortionState::Rectified,
-            _ => DistortionState::Unknown,
-        };
-        correct::Plan::from_findings(&findings, state, camera.as_ref(), sampling)
-            .map_err(|e| Error::Document(e.to_string()))
+        if self.distortion_state == DistortionState::RectifiedTwice.name() {
+            let twice = Step::Undistort(Lens::OwnTablesTwice);
+            steps.push((twice, Because::Finding(Code::TD203)));
+        }
+        Plan::merged(steps, sampling).map_err(unusable)
     }
 }

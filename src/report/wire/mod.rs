@@ -16,6 +16,7 @@
 
 mod audit;
 mod calibration;
+mod correct;
 mod detect;
 mod devices;
 
@@ -27,6 +28,7 @@ pub use calibration::{
     BoardSurface, Calibration, Candidate, Distortion, DistortionTest, Hypothesis, LeftOut, Outlier,
     Parameter, ProjectionUncertainty, Rejected, RollingShutter, Surface, Table, View,
 };
+pub use correct::{Correct, PinholeInfo, StepInfo};
 pub use detect::{Detect, DetectedCorner, DetectedIdentity, DetectedImage, RejectedCorner};
 pub use devices::{Compare, IdentityInfo, Inspect, PairCorrections, PairInfo, SheetInfo, SideInfo};
 
@@ -54,6 +56,9 @@ pub enum Document {
     /// What `truedepth compare --json` prints.
     #[serde(rename = "truedepth.compare/1")]
     Compare(Compare),
+    /// What `truedepth correct --json` prints and `provenance.json` holds.
+    #[serde(rename = "truedepth.correct/1")]
+    Correct(Box<Correct>),
 }
 
 impl Document {
@@ -85,9 +90,11 @@ mod tests {
     use super::*;
     use crate::{
         camera::{self, Brown, RadialTable, TablePair},
+        correct::{Because, Plan, Sampling, Step},
         detect::Observation,
         diagnose,
         geom::Pixel,
+        recording::Memory,
         report::{sample, to_json},
     };
 
@@ -132,6 +139,26 @@ mod tests {
         let pairs = diagnose::pairs(&diagnose::Registry::published());
         let some = [&pairs[2], &pairs[7]].map(Clone::clone);
         golden("compare.json", &Document::Compare(Compare::new(&some)));
+    }
+
+    #[test]
+    fn correct() {
+        let recording = sample::recording();
+        let audit = Audit::from(&sample::audit());
+        let mut plan = audit.plan(Sampling::EdgeAware).unwrap();
+        assert_eq!(plan.steps().len(), 1, "{plan:?}");
+        let mut steps = plan.steps().to_vec();
+        steps.push((Step::DepthZoom { zoom: [0.95; 2] }, Because::Told));
+        plan = Plan::because(steps, Sampling::EdgeAware).unwrap();
+        let mut sink = Memory::new("fixed");
+        let done = crate::correct::correct(&recording, &plan, &mut sink).unwrap();
+        let faults = audit.faults().cloned().collect();
+        let mut document = Correct::new(&recording, &plan, &done, faults);
+        // How a PNG is compressed is the encoder's affair.
+        document.files.values_mut().for_each(|hash| hash.replace_range(8.., "..."));
+        document.input_sha256.replace_range(.., "...");
+        document.files.retain(|name, _| !name.ends_with(".png"));
+        golden("correct.json", &Document::Correct(Box::new(document)));
     }
 
     #[test]
