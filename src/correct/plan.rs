@@ -242,15 +242,15 @@ impl Plan {
         }
         if state == DistortionState::RectifiedTwice {
             let twice = Step::Undistort(Lens::OwnTablesTwice);
-            steps.push((twice, Because::Finding(Code::TD203)));
+            steps.push((twice, Because::Finding(Code::TD204)));
         }
         Self::merged(steps, sampling)
     }
 
     /// As [`because`](Self::because), for steps that several findings have contributed to: scales and zooms multiply,
     /// biases and shifts add, what changes nothing goes, and a calibrated camera's own pinhole goes before others.
-    /// Where a finding calls for mirroring depth alone, what findings say of depth otherwise is dropped: audit the
-    /// result.
+    /// Where a finding calls for mirroring back, what findings have read across mirrored images is dropped (of depth
+    /// alone: all of depth; of both: principal point and shift): audit the result.
     pub fn merged(steps: Vec<(Step, Because)>, sampling: Sampling) -> Result<Self, Error> {
         let mut merged: Vec<(Step, Because)> = Vec::new();
         let brings_pinhole =
@@ -279,16 +279,21 @@ impl Plan {
                 _ => merged.push((step, because)),
             }
         }
-        // Read through mirrored depth maps, nothing else of them was measured: a second audit does that.
-        let unread = merged
-            .iter()
-            .any(|(s, b)| matches!((s, b), (Step::Unmirror(Mirrored::Depth), Because::Finding(_))));
+        // Read through mirrored images, places across them were not measured: a second audit does that.
+        let mirrored = merged.iter().find_map(|(step, because)| match (step, because) {
+            (Step::Unmirror(what), Because::Finding(_)) => Some(*what),
+            _ => None,
+        });
+        let unread = |step: &Step| match mirrored {
+            Some(Mirrored::Both) => matches!(step, Step::Center { .. } | Step::DepthShift { .. }),
+            Some(Mirrored::Depth) => matches!(
+                step,
+                Step::DepthZoom { .. } | Step::DepthShift { .. } | Step::Depth { .. }
+            ),
+            None => false,
+        };
         merged.retain(|(step, because)| match step {
-            Step::DepthZoom { .. } | Step::DepthShift { .. } | Step::Depth { .. }
-                if unread && matches!(because, Because::Finding(_)) =>
-            {
-                false
-            }
+            _ if matches!(because, Because::Finding(_)) && unread(step) => false,
             Step::DepthZoom { zoom } => *zoom != [1.0; 2],
             Step::DepthShift { shift_px } => *shift_px != [0.0; 2],
             Step::Depth { scale, bias_m } => (*scale, *bias_m) != (1.0, 0.0),

@@ -2,7 +2,9 @@
 
 use super::{
     Case, Code, Device, Evidence, Finding, Identity, KnownIssue, Registry, Sheet, Tolerances, Unit,
-    Verdict, td101_files, td501_distortion_centre, td503_intrinsics_size, td504_field_of_view,
+    Verdict, td101_files, td102_dropped_frames, td103_metadata_incomplete, td205_factory_changed,
+    td501_distortion_centre, td502_reference_dimensions, td503_intrinsics_size,
+    td504_field_of_view,
 };
 use crate::{board::CharucoBoard, recording::Recording};
 
@@ -15,8 +17,8 @@ pub struct Inspection<'a> {
     pub sheet: Option<Sheet>,
     /// Which known device it is; `None` without a sheet.
     pub identity: Option<Identity<'a>>,
-    /// By code: TD101, TD5xx as an audit would find them, and TD201, TD203, TD401 as *warning* where the registry or
-    /// the metadata give reason to expect a fault that only an audit can measure.
+    /// By code: TD101 to TD103, TD205, TD5xx as an audit would find them, and TD201, TD203, TD401 as *warning* where
+    /// the registry or the metadata give reason to expect a fault that only an audit can measure.
     pub findings: Vec<Finding>,
 }
 
@@ -29,13 +31,21 @@ pub fn inspect<'a>(recording: &Recording, registry: &'a Registry) -> Inspection<
     let board = recording.board.clone().unwrap_or_else(|| {
         CharucoBoard::paper(0.020_875).expect("the paper's board has a square of 20.875 mm")
     });
+    let t_ns: Vec<i64> = recording.frames.iter().map(|f| f.t_ns).collect();
     let case = Case {
         problems: &recording.problems,
         n_frames: recording.frames.len(),
         factory,
+        t_ns: &t_ns,
         ..Case::unseen(&board, Tolerances::default())
     };
-    let mut findings = vec![td101_files::check(&case)];
+    let mut findings = vec![
+        td101_files::check(&case),
+        td102_dropped_frames::check(&case),
+        td103_metadata_incomplete::check(&case),
+        td205_factory_changed::check(&case),
+        td502_reference_dimensions::check(&case),
+    ];
     findings.extend(identity.iter().flat_map(expected));
     let known_rectified = findings.iter().all(|f| f.code != Code::TD203);
     if let Some(false) = factory.and_then(|f| f.geometric_distortion_correction)

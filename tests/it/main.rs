@@ -3,8 +3,8 @@
 //! Tests on real recordings ask [`data`] for them and end early, saying so, where the folder is absent.
 
 mod calibrate;
-mod coverage;
 mod correct;
+mod coverage;
 mod detect;
 mod photos;
 mod real_alignment;

@@ -176,6 +176,9 @@ impl Audit {
             };
             let called = match correction.kind.as_str() {
                 "focal" => vec![Step::Focal { focal_px: number("focal_px")? }],
+                "principal_point" => vec![Step::Center {
+                    center_px: [number("center_x_px")?, number("center_y_px")?],
+                }],
                 "undistort" => {
                     vec![Step::undistort(has_tables, camera.as_ref()).map_err(unusable)?]
                 }
@@ -201,7 +204,7 @@ impl Audit {
         }
         if self.distortion_state == DistortionState::RectifiedTwice.name() {
             let twice = Step::Undistort(Lens::OwnTablesTwice);
-            steps.push((twice, Because::Finding(Code::TD203)));
+            steps.push((twice, Because::Finding(Code::TD204)));
         }
         Plan::merged(steps, sampling).map_err(unusable)
     }
