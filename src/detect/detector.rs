@@ -286,15 +286,23 @@ pub(super) fn most_saddles(level: &Level) -> usize {
     ((MOST_SADDLES_PER_MPX * mpx) as usize).max(LEAST_MOST_SADDLES)
 }
 
-/// Blocks to try, best guess first: squares of 12 to 150 pixels are seen at half resolution, smaller ones at full,
-/// larger ones on a coarser level.
+/// Blocks to try, best guess first. Below 2560 pixels across, squares of 12 to 150 pixels are seen at half resolution,
+/// smaller ones at full, larger ones on a coarser level. In larger images squares have more pixels, too: they begin
+/// coarser, and full resolution, which costs most, comes last.
 pub(super) fn factors(image: &Gray) -> Vec<usize> {
-    let size = image.width().min(image.height());
-    let mut factors = vec![2, 1, 3];
+    let (width, height) = (image.width(), image.height());
+    let first = 2 * (width.max(height) / 1280).max(1);
+    let first = 1 << first.ilog2();
+    let mut factors = if first == 2 { vec![2, 1, 3] } else { vec![first] };
     let mut factor = 4;
-    while size / factor >= COARSEST {
-        factors.push(factor);
+    while width.min(height) / factor >= COARSEST {
+        if factor != first {
+            factors.push(factor);
+        }
         factor *= 2;
+    }
+    if first != 2 {
+        factors.extend([2, 1]);
     }
     factors
 }
