@@ -25,7 +25,7 @@ pub(super) const MOST_CELLS: usize = 64;
 /// Pairs of a placement and a cell at most: about a tenth of a second.
 pub(super) const MOST_TRIALS: usize = 60_000;
 /// Placements looked at closely.
-const SHORT_LIST: usize = 24;
+const SHORT_LIST: usize = 32;
 /// Placements are compared where they expect a marker in this part of the cells at least. Fewer would leave too much
 /// of what looks like a marker beyond the board.
 const MIN_SHARE: f64 = 2.0 / 3.0;
@@ -71,7 +71,9 @@ pub(super) struct Contest<'a> {
     n_cells: usize,
     entrants: &'a [Entrant],
     /// Every pair of a cell and a marker is met by many placements: correlated once.
-    parts: Vec<Option<Box<[f32; TAPS]>>>,
+    parts: Vec<[f32; TAPS]>,
+    /// Where in `parts` a turn, cell and marker are, plus one.
+    places: Vec<u32>,
     /// Σ of the squared samples of each cell.
     energies: Vec<f64>,
     /// Scores by entrant and mask.
@@ -85,11 +87,12 @@ impl<'a> Contest<'a> {
         n_cells: usize,
         entrants: &'a [Entrant],
     ) -> Self {
-        let parts = vec![None; values.len() * n_cells * model.normals.len()];
+        let places = vec![0; values.len() * n_cells * model.normals.len()];
         let energy = |samples: &[f32]| samples.iter().map(|v| f64::from(v * v)).sum();
         // The same in all turns; the first is always there.
         let energies = values[0].chunks_exact(model.n2).map(energy).collect();
-        Self { model, values, n_cells, entrants, parts, energies, scores: BTreeMap::new() }
+        let (parts, scores) = (Vec::new(), BTreeMap::new());
+        Self { model, values, n_cells, entrants, parts, places, energies, scores }
     }
 
     /// The placement that no other beats, if its lead is clear.
@@ -172,10 +175,13 @@ impl<'a> Contest<'a> {
         for (cell, id) in in_mask(markers, mask) {
             let samples = &self.values[*turn][cell * n2..][..n2];
             let key = (turn * self.n_cells + cell) * self.model.normals.len() + id;
-            let part =
-                self.parts[key].get_or_insert_with(|| Box::new(self.model.correlate(id, samples)));
-            for (sum, part) in right.iter_mut().zip(part.iter()) {
-                *sum += f64::from(*part);
+            if self.places[key] == 0 {
+                self.parts.push(self.model.correlate(id, samples));
+                self.places[key] = self.parts.len() as u32;
+            }
+            let part = &self.parts[self.places[key] as usize - 1];
+            for k in 0..TAPS {
+                right[k] += f64::from(part[k]);
             }
             energy += self.energies[cell];
         }
