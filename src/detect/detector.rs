@@ -53,6 +53,8 @@ const MOST_LATTICES: usize = 4;
 const COARSEST: usize = 60;
 /// Rounds of looking for corners that the last round brought into reach.
 const MOST_PASSES: usize = 4;
+/// A node farther than this from where the map expects it is no start for its corner, pixels.
+const MAX_START_PX: f64 = 1.0;
 /// A corner whose σ exceeds this is of no use, pixels.
 const MAX_SIGMA_PX: f64 = 0.7;
 
@@ -168,6 +170,11 @@ impl Detector {
                 rejects.push(Reject { pixel: node.pixel, reason: Reason::OffBoard });
             }
         }
+        // A node of the lattice is where its corner is, to a fraction of a pixel: a better start than the map.
+        let mut starts: Vec<Option<Pixel>> = vec![None; board.n_corners()];
+        for &([x, y], pixel) in &known {
+            starts[y as usize * columns as usize + x as usize] = Some(pixel);
+        }
         let contrast = found.lattice.contrast;
         // First what the lattice foretells; what that finds brings corners into reach that were too far from it.
         let mut corners: Vec<Corner> = Vec::new();
@@ -188,7 +195,9 @@ impl Detector {
                 if !inside(scales.image(), predicted) {
                     continue;
                 }
-                match self.corner(scales, predicted, axes, contrast) {
+                let near = |start: &Pixel| start.distance(predicted) < MAX_START_PX;
+                let start = starts[id].take().filter(near).unwrap_or(predicted);
+                match self.corner(scales, start, axes, contrast) {
                     Ok((pixel, sigma_px)) => corners.push(Corner { id, pixel, sigma_px }),
                     Err(reason) => failed.push(Reject { pixel: predicted, reason }),
                 }

@@ -309,7 +309,9 @@ impl Expected {
         lattice: &Lattice,
         cells: &[Cell],
     ) -> Result<Placement, NotIdentified> {
-        self.best_by_bits(lattice, cells, 0..8, BLURRED_INSIDE).map(|(placement, _)| placement)
+        self.best_by_bits(lattice, cells, 0..4, BLURRED_INSIDE)
+            .or_else(|_| self.best_by_bits(lattice, cells, 0..8, BLURRED_INSIDE))
+            .map(|(placement, _)| placement)
     }
 
     /// Lays the lattice onto the board where [`by_bits`](Self::by_bits) failed: under an unknown blur, then as a

@@ -65,9 +65,10 @@ const MIN_STRENGTH: f32 = 1.0;
 /// Difference between bright and dark on the ring, grey levels.
 const MIN_CONTRAST: f32 = 8.0;
 
-/// Saddles much weaker than the strongest are texture: the strength goes with the square of the contrast, so a corner
-/// in deep shade (a tenth of the light) stays above.
-const MIN_RELATIVE_STRENGTH: f32 = 0.005;
+/// Saddles much weaker than the strongest are texture and noise: the strength goes with the square of the contrast, so
+/// a corner in shade (an eighth of the light) stays above. A corner in deeper shade is no node of the lattice, but it
+/// is looked for where the lattice expects it.
+const MIN_RELATIVE_STRENGTH: f32 = 0.015;
 /// The strongest saddle that counts for this is the one of this rank: a few reflections must not set the scale.
 const REFERENCE_RANK: usize = 24;
 
