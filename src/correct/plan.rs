@@ -505,7 +505,8 @@ mod tests {
         let plan = |findings: &[(Code, Correction)], state, camera: Option<&Camera>| {
             Plan::from_findings(findings, state, camera, Sampling::EdgeAware)
         };
-        let none = plan(&[undistort.clone()], DistortionState::Distorted, Some(&camera));
+        let none =
+            plan(std::slice::from_ref(&undistort), DistortionState::Distorted, Some(&camera));
         assert!(matches!(none, Err(Error::NoWay(_))));
         let brown = crate::camera::Brown { k1: 0.07, k2: 0.0, p1: 0.0, p2: 0.0, k3: 0.0 };
         let lens = Camera { distortion: Distortion::Brown(brown), ..camera };

@@ -301,8 +301,7 @@ mod tests {
                 let (sx, sy) = (x.clamp(0.0, 40.0), y.clamp(0.0, 30.0));
                 let plane = 0.3 + 0.0005 * sx + 0.0002 * sy;
                 let error = (z - plane).abs().min((z - plane - 0.1).abs());
-                let bound = if sampling == Sampling::Nearest { 0.000_36 } else { 0.000_36 };
-                assert!(error <= bound, "{sampling:?} at {x}, {y}: {z}");
+                assert!(error <= 0.000_36, "{sampling:?} at {x}, {y}: {z}");
             }
             assert!(n > 700, "{n}");
         }

@@ -306,7 +306,7 @@ impl Drop for Browser {
             );
             stream.write_all(head.as_bytes()).ok();
             stream.set_read_timeout(Some(Duration::from_secs(5))).ok();
-            stream.read(&mut [0; 64]).ok();
+            stream.read_to_end(&mut Vec::new()).ok();
         }
         self.driver.kill().ok();
         self.driver.wait().ok();

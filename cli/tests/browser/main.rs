@@ -4,6 +4,8 @@
 //! Chromium and chromedriver are looked for in the PATH; without them the tests say `skipped: ...` and pass, unless
 //! `TRUEDEPTH_BROWSER=required` is set, as `.ci/run` does.
 
+#![allow(clippy::print_stdout, reason = "a test that is skipped says so")]
+
 mod driver;
 mod interaction;
 mod page;
