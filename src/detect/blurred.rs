@@ -12,7 +12,7 @@
 
 use std::collections::BTreeMap;
 
-use super::simd::vectorized;
+use super::simd::{dot, vectorized};
 
 /// Reach of the blur's kernel, bits to each side.
 const REACH: i32 = 3;
@@ -251,20 +251,6 @@ impl BlurFit {
     }
 }
 
-/// Σ a·b in eight sums, which the compiler makes vectors of.
-#[inline(always)]
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<8>(), b.as_chunks::<8>());
-    let mut sums = [0.0; 8];
-    for (a, b) in a.iter().zip(b) {
-        for k in 0..8 {
-            sums[k] += a[k] * b[k];
-        }
-    }
-    let rest: f64 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
-    sums.iter().sum::<f64>() + rest
-}
-
 /// Lower triangular L with L Lᵀ = N, with a ridge for so many samples; `None` where N is not positive.
 fn root(normal: &Normal, n_samples: f64) -> Option<Box<[f64; TRIANGLE]>> {
     vectorized(
@@ -279,20 +265,15 @@ fn decompose(normal: &Normal, n_samples: f64) -> Option<Box<[f64; TRIANGLE]>> {
     let start = |row: usize| row * (row + 1) / 2;
     for i in 0..TAPS {
         let (above, here) = root.split_at_mut(start(i));
-        for j in 0..=i {
-            let other = if j < i { &above[start(j)..][..j] } else { &[] };
-            if j < i {
-                let sum = dot(&here[..j], other);
-                here[j] = (here[j] - sum) / above[start(j) + j];
-            } else {
-                let sum = dot(&here[..i], &here[..i]);
-                let pivot = here[i] + 1e-3 * n_samples - sum;
-                if !(pivot > 0.0) {
-                    return None;
-                }
-                here[i] = pivot.sqrt();
-            }
+        for j in 0..i {
+            let sum = dot(&here[..j], &above[start(j)..][..j]);
+            here[j] = (here[j] - sum) / above[start(j) + j];
         }
+        let pivot = here[i] + 1e-3 * n_samples - dot(&here[..i], &here[..i]);
+        if !(pivot > 0.0) {
+            return None;
+        }
+        here[i] = pivot.sqrt();
     }
     Some(root)
 }

@@ -26,6 +26,7 @@ use super::{
     blurred::{BlurModel, Contest, Entrant, MOST_CELLS, MOST_TRIALS, Won},
     lattice::Lattice,
     map::SmoothMap,
+    simd::dot,
 };
 
 /// How a lattice lies on the board.
@@ -489,19 +490,6 @@ impl Expected {
         let Won { index, margin, significance } = won;
         accept(Placement { margin, significance, ..candidates[index].place })
     }
-}
-
-/// Σ a·b in eight sums, which the compiler makes vectors of.
-fn dot(a: &[f32], b: &[f32]) -> f32 {
-    let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<8>(), b.as_chunks::<8>());
-    let mut sums = [0.0_f32; 8];
-    for (a, b) in a.iter().zip(b) {
-        for k in 0..8 {
-            sums[k] += a[k] * b[k];
-        }
-    }
-    let rest: f32 = a_rest.iter().zip(b_rest).map(|(a, b)| a * b).sum();
-    sums.iter().sum::<f32>() + rest
 }
 
 /// The best candidate and the score of the runner-up.
