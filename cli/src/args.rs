@@ -2,6 +2,7 @@
 
 mod correct;
 mod paper;
+mod pictures;
 
 use std::path::PathBuf;
 
@@ -9,7 +10,8 @@ use clap::{Parser, Subcommand, ValueEnum, builder::PossibleValuesParser};
 use correct::CORRECT_EXAMPLES;
 pub(crate) use correct::{CorrectArgs, SamplingChoice, Steps};
 use paper::{COMPARE_EXAMPLES, INSPECT_EXAMPLES};
-pub(crate) use paper::{CompareArgs, InspectArgs};
+pub(crate) use paper::{CompareArgs, DevicesArgs, InspectArgs};
+pub(crate) use pictures::{DepthRange, OverlayArgs, UndistortArgs};
 use truedepth::{
     board::{self, CharucoBoard, Dictionary},
     calibrate::Model,
@@ -162,6 +164,10 @@ pub(crate) enum Command {
     /// it could not.
     #[command(after_help = CORRECT_EXAMPLES)]
     Correct(CorrectArgs),
+
+    // These say themselves, where their options are, what they do.
+    Overlay(OverlayArgs),
+    Undistort(UndistortArgs),
 
     /// Print the board: a PDF, SVG or PNG true to scale, and the board.toml for recordings of it
     ///

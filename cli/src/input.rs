@@ -39,6 +39,11 @@ pub(crate) fn recordings(path: &Path, args: &InputArgs) -> Result<Vec<Found>, Fa
     Ok(recording::discover(path, &limits(args))?)
 }
 
+/// Whether a path holds a recording, or would if it were whole; else it is a file of another kind.
+pub(crate) fn is_recording(path: &Path, args: &InputArgs) -> bool {
+    path.is_dir() || recording::discover(path, &limits(args)).is_ok()
+}
+
 /// What can be searched for a board.
 pub(crate) enum Input {
     /// The recordings in a folder or archive.

@@ -307,9 +307,8 @@ fn own_camera(
     let size_px = frames.iter().find_map(|f| f.size_px);
     let method = match method {
         Method::Given(camera) => {
-            let given = [camera.intrinsics.width, camera.intrinsics.height];
-            if let Some(size) = size_px.filter(|size| *size != given) {
-                return Err(Error::CameraSize { recording: ground.place.to_owned(), given, size });
+            if let Some(size) = size_px {
+                camera.check_size(size, ground.place)?;
             }
             return Ok(Own { camera: Some((**camera).clone()), ..Own::default() });
         }

@@ -48,6 +48,21 @@ pub struct Camera {
     pub distortion: Distortion,
 }
 
+/// A camera for images of another size.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "the calibration given is for images of {}x{} pixels, {recording} has {}x{}: give one made at that size",
+    .given[0], .given[1], .size[0], .size[1]
+)]
+pub struct OtherSize {
+    /// Where the recording is.
+    pub recording: String,
+    /// Columns and rows of the camera given.
+    pub given: [usize; 2],
+    /// Columns and rows of the images.
+    pub size: [usize; 2],
+}
+
 /// A camera model that cannot be.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -91,6 +106,15 @@ pub enum Error {
 }
 
 impl Camera {
+    /// Refuses images of another size than it is for; `recording` names them in the error.
+    pub fn check_size(&self, size: [usize; 2], recording: &str) -> Result<(), OtherSize> {
+        let given = [self.intrinsics.width, self.intrinsics.height];
+        if given == size {
+            return Ok(());
+        }
+        Err(OtherSize { recording: recording.to_owned(), given, size })
+    }
+
     /// The pixel where the lens draws this point; `None` at or behind the camera's plane (z ≤ 0) and outside the
     /// domain of the distortion model.
     pub fn project(&self, point: Point<Color>) -> Option<Pixel> {

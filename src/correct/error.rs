@@ -1,6 +1,6 @@
 //! Why a correction cannot be made.
 
-use crate::recording;
+use crate::{camera::OtherSize, recording};
 
 /// A correction that cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -35,18 +35,8 @@ pub enum Error {
         remedy: &'static str,
     },
     /// A camera for images of another size.
-    #[error(
-        "the calibration given is for images of {}x{} pixels, {recording} has {}x{}: give one made at that size",
-        .given[0], .given[1], .size[0], .size[1]
-    )]
-    CameraSize {
-        /// Where the recording is.
-        recording: String,
-        /// Columns and rows of the camera given.
-        given: [usize; 2],
-        /// Columns and rows of the images.
-        size: [usize; 2],
-    },
+    #[error(transparent)]
+    CameraSize(#[from] OtherSize),
     /// A finding that names no way back.
     #[error("{0}")]
     NoWay(String),

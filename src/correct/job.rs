@@ -4,7 +4,7 @@ use sha2::{Digest, Sha256};
 
 use super::{
     Error, Mirrored, Plan,
-    map::{Geometry, PixelMap, mirrored},
+    map::{Geometry, PixelMap},
     warp::{ColorWarp, DepthWarp},
 };
 use crate::{
@@ -78,8 +78,7 @@ pub fn correct_observed<S: Sink>(
     let amended = |factory: &Factory| {
         reference.map(|reference| plan.intrinsics(&factory.intrinsics, &reference))
     };
-    // One map for all frames of the same metadata, which is nearly always all of them.
-    let usual = Warps::new(recording, plan, recording.factory())?;
+    let corrector = Corrector::new(recording, plan)?;
     let total = recording.frames.len();
     let mut hashes = Vec::new();
     let mut n_depths = [0; 2];
@@ -87,7 +86,7 @@ pub fn correct_observed<S: Sink>(
     const BATCH: usize = 16;
     let indices: Vec<usize> = (0..total).collect();
     for batch in indices.chunks(BATCH) {
-        let one = |&index: &usize| frame(recording, plan, &usual, index);
+        let one = |&index: &usize| corrector.frame(index);
         #[cfg(feature = "parallel")]
         let done: Vec<Result<Vec<Output>, Error>> = {
             use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
@@ -197,56 +196,88 @@ impl Warps {
     }
 }
 
-/// The files of one frame.
-fn frame(
-    recording: &Recording,
-    plan: &Plan,
-    usual: &Warps,
-    index: usize,
-) -> Result<Vec<Output>, Error> {
-    let source = &recording.frames[index];
-    let own;
-    // Frames of other metadata than the recording's get maps of their own.
-    let warps = match &source.factory {
-        Some(factory) if recording.factory() != Some(factory) && plan.moves_depth() => {
-            own = Warps::new(recording, plan, Some(factory))?;
-            &own
-        }
-        _ => usual,
-    };
-    let mut outputs = Vec::new();
-    if let Some(name) = &source.color {
-        let read = recording.file(name)?;
-        let hash = hash_of(name, &read);
-        let bytes = if plan.changes_color() {
-            color(recording.rgb(index)?, plan, warps).to_png()
-        } else {
-            read
-        };
-        outputs.push(Output { hash, bytes, n_depths: [0; 2] });
+/// Corrected images without files: one frame at a time, on as many threads as ask.
+pub struct Corrector<'a> {
+    recording: &'a Recording,
+    plan: &'a Plan,
+    usual: Warps,
+}
+
+impl<'a> Corrector<'a> {
+    /// Prepares the plan. Errors: the recording lacks what the plan needs.
+    pub fn new(recording: &'a Recording, plan: &'a Plan) -> Result<Self, Error> {
+        // One map for all frames of the same metadata, which is nearly always all of them.
+        let usual = Warps::new(recording, plan, recording.factory())?;
+        Ok(Self { recording, plan, usual })
     }
-    if let Some(name) = &source.depth {
-        let read = recording.file(name)?;
-        let hash = hash_of(name, &read);
-        if plan.changes_depth() {
-            let map = recording.depth(index)?;
-            let count =
-                |map: &DepthMap| map.depth_m().iter().filter(|z| !z.is_nan()).count() as u64;
-            let before = count(&map);
-            let map = depth(map, plan, warps);
-            let n_depths = [before, count(&map)];
-            outputs.push(Output { hash, bytes: encode_depth(&map), n_depths });
-        } else {
-            outputs.push(Output { hash, bytes: read, n_depths: [0; 2] });
-        }
+
+    /// The colour image of a frame, corrected.
+    pub fn color(&self, index: usize) -> Result<Rgb, Error> {
+        let warps = self.warps(index)?;
+        Ok(color(self.recording.rgb(index)?, self.plan, warps.get(&self.usual)))
     }
-    Ok(outputs)
+
+    /// The depth map of a frame, corrected.
+    pub fn depth(&self, index: usize) -> Result<DepthMap, Error> {
+        let warps = self.warps(index)?;
+        Ok(depth(self.recording.depth(index)?, self.plan, warps.get(&self.usual)))
+    }
+
+    /// Frames of other metadata than the recording's get maps of their own.
+    fn warps(&self, index: usize) -> Result<OwnWarps, Error> {
+        Ok(OwnWarps(match &self.recording.frames[index].factory {
+            Some(factory)
+                if self.recording.factory() != Some(factory) && self.plan.moves_depth() =>
+            {
+                Some(Warps::new(self.recording, self.plan, Some(factory))?)
+            }
+            _ => None,
+        }))
+    }
+
+    /// The files of one frame.
+    fn frame(&self, index: usize) -> Result<Vec<Output>, Error> {
+        let (recording, plan) = (self.recording, self.plan);
+        let source = &recording.frames[index];
+        let mut outputs = Vec::new();
+        if let Some(name) = &source.color {
+            let read = recording.file(name)?;
+            let hash = hash_of(name, &read);
+            let bytes = if plan.changes_color() { self.color(index)?.to_png() } else { read };
+            outputs.push(Output { hash, bytes, n_depths: [0; 2] });
+        }
+        if let Some(name) = &source.depth {
+            let read = recording.file(name)?;
+            let hash = hash_of(name, &read);
+            if plan.changes_depth() {
+                let map = recording.depth(index)?;
+                let count =
+                    |map: &DepthMap| map.depth_m().iter().filter(|z| !z.is_nan()).count() as u64;
+                let before = count(&map);
+                let warps = self.warps(index)?;
+                let map = depth(map, plan, warps.get(&self.usual));
+                let n_depths = [before, count(&map)];
+                outputs.push(Output { hash, bytes: encode_depth(&map), n_depths });
+            } else {
+                outputs.push(Output { hash, bytes: read, n_depths: [0; 2] });
+            }
+        }
+        Ok(outputs)
+    }
+}
+
+/// Maps of one frame, where it has any of its own.
+struct OwnWarps(Option<Warps>);
+
+impl OwnWarps {
+    fn get<'a>(&'a self, usual: &'a Warps) -> &'a Warps {
+        self.0.as_ref().unwrap_or(usual)
+    }
 }
 
 fn color(mut image: Rgb, plan: &Plan, warps: &Warps) -> Rgb {
     if plan.unmirror() == Some(Mirrored::Both) {
-        let pixels = mirrored(image.width(), image.pixels());
-        image = Rgb::new(image.width(), image.height(), pixels);
+        image = image.mirrored();
     }
     match &warps.color {
         Some(warp) => warp.apply(&image),
@@ -256,8 +287,7 @@ fn color(mut image: Rgb, plan: &Plan, warps: &Warps) -> Rgb {
 
 fn depth(mut map: DepthMap, plan: &Plan, warps: &Warps) -> DepthMap {
     if plan.unmirror().is_some() {
-        let depth_m = mirrored(map.width(), map.depth_m());
-        map = DepthMap::new(map.width(), map.height(), depth_m);
+        map = map.mirrored();
     }
     if let Some(warp) = &warps.depth {
         map = warp.apply(&map);

@@ -58,12 +58,8 @@ impl<'a> Geometry<'a> {
                 );
             }
             Some(Lens::Camera(camera)) => {
-                let k = &camera.intrinsics;
-                let given = [k.width, k.height];
-                if let Some(size) = factory.map(|f| [f.intrinsics.width, f.intrinsics.height])
-                    && given != size
-                {
-                    return Err(Error::CameraSize { recording: place.to_owned(), given, size });
+                if let Some(f) = factory {
+                    camera.check_size([f.intrinsics.width, f.intrinsics.height], place)?;
                 }
             }
             _ => {}
@@ -97,11 +93,6 @@ impl<'a> Geometry<'a> {
         let (cx, cy) = self.after.map_or((0.0, 0.0), |k| (k.cx, k.cy));
         Some(Pixel::new(cx + (color.x - cx) / zx + sx, cy + (color.y - cy) / zy + sy))
     }
-}
-
-/// Every row the other way round.
-pub(super) fn mirrored<T: Copy>(width: usize, pixels: &[T]) -> Vec<T> {
-    pixels.chunks(width).flat_map(|row| row.iter().rev().copied()).collect()
 }
 
 impl Mirrored {

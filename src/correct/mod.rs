@@ -26,10 +26,12 @@ mod error;
 mod job;
 mod map;
 mod plan;
+mod straight;
 mod warp;
 
 pub use error::Error;
-pub use job::{Corrected, FileHash, Progress, correct, correct_observed};
+pub use job::{Corrected, Corrector, FileHash, Progress, correct, correct_observed};
 pub use map::PixelMap;
 pub use plan::{Because, Lens, Mirrored, Plan, Sampling, Step};
+pub use straight::{BoardLine, Rectifier, Straightness, StreamState, Treatment, board_lines};
 pub use warp::{ColorWarp, DepthWarp, EDGE};

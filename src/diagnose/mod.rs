@@ -63,5 +63,3 @@ pub use finding::{Correction, Evidence, Finding, Tolerances, Unit, Verdict};
 pub use inspect::{Inspection, inspect};
 pub use pair::{AcrossApis, Comparison, SameApi, Side, compare, pairs};
 pub use registry::{Api, Certainty, Entry, Identity, KnownIssue, Registry, RegistryError, Sheet};
-pub use td205_factory_changed::factory_changed;
-pub use td502_reference_dimensions::reference_dimensions;

@@ -10,7 +10,9 @@
 //!
 //! all at the reference dimensions (IRD); times W / IRD_w for an image W pixels wide.
 
-use super::{Api, Code, Correction, Evidence, Finding, KnownIssue, Registry, Sheet, Unit, Verdict};
+use super::{
+    Api, Finding, KnownIssue, Registry, Sheet, td205_factory_changed, td502_reference_dimensions,
+};
 
 /// One side of a comparison.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,9 +72,7 @@ pub struct Comparison {
 const SAME_FOCAL: f64 = 0.005;
 /// Beyond this the reference dimensions differ: 0 %, 5.2 % and 42.9 % in the paper.
 const SAME_REFERENCE: f64 = 0.001;
-/// Nothing but a changed calibration moves a focal length by more: single precision has 1e-7.
-const UNCHANGED_FOCAL: f64 = 1e-5;
-/// As above for a place at the reference dimensions.
+/// Nothing but a changed calibration moves a place at the reference dimensions by more.
 const UNCHANGED_PX: f64 = 0.02;
 
 /// Compares what AVFoundation and ARKit say of one device, or, where both are known to be of one API, what one API
@@ -94,7 +94,7 @@ pub fn compare(first: Side, second: Side) -> Comparison {
         _ => same.same_unit,
     };
     if of_one_api {
-        let findings = vec![changed(&first, &second, &same)];
+        let findings = vec![td205_factory_changed::between(&first, &second, &same)];
         return Comparison { first, second, across: None, same: Some(same), findings };
     }
     let reference_difference =
@@ -114,7 +114,7 @@ pub fn compare(first: Side, second: Side) -> Comparison {
         av_corrected_px: a.focal_px * a.focal_px / b.focal_px,
         ar_corrected_px: b.focal_px * (1.0 + 2.0 * (1.0 - b.focal_px / a.focal_px)),
     };
-    let findings = vec![references(&a, &b, &across)];
+    let findings = vec![td502_reference_dimensions::between(&a, &b, &across)];
     Comparison { first, second, across: Some(across), same: None, findings }
 }
 
@@ -126,101 +126,6 @@ fn is_same_unit(a: &Sheet, b: &Sheet) -> bool {
         _ => true,
     };
     a.reference == b.reference && near(a.center, b.center) && centers
-}
-
-/// TD205.
-fn changed(first: &Side, second: &Side, same: &SameApi) -> Finding {
-    let mut finding = Finding::new(Code::TD205, Unit::Percent);
-    let percent = 100.0 * same.focal_difference;
-    finding.value = Some(percent);
-    finding.evidence = vec![
-        Evidence::number("first_focal_px", first.sheet.focal_px),
-        Evidence::number("second_focal_px", second.sheet.focal_px),
-        Evidence::number("center_shift_x_px", same.center_shift_px[0]),
-        Evidence::number("center_shift_y_px", same.center_shift_px[1]),
-    ];
-    if !same.same_unit {
-        finding.verdict = Verdict::Unknown;
-        let [x, y] = same.center_shift_px;
-        finding.summary = format!(
-            "The two are not of one device, or its whole calibration was made anew: the principal points lie \
-             ({x:+.2}, {y:+.2}) px apart at the reference dimensions."
-        );
-        finding.what_to_do = "Compare recordings of one device.".to_owned();
-    } else if same.focal_difference.abs() <= UNCHANGED_FOCAL {
-        finding.verdict = Verdict::Ok;
-        finding.summary = "The factory calibration is the same in both.".to_owned();
-    } else {
-        finding.verdict = Verdict::Warning;
-        finding.summary = format!(
-            "The factory calibration of one device has changed: focal length {:.2} px, then {:.2} px at the reference \
-             dimensions ({percent:+.3} %), with principal point and distortion centre as before.",
-            first.sheet.focal_px, second.sheet.focal_px
-        );
-        finding.what_to_do = "Keep the metadata with each recording and use its own: the paper saw such a change with \
-                              an update of the system, and an iPhone shows one from recording to recording. It is no \
-                              sign that either value is right."
-            .to_owned();
-    }
-    finding
-}
-
-/// TD502, and which correction the pair calls for.
-fn references(av: &Sheet, ar: &Sheet, across: &AcrossApis) -> Finding {
-    let mut finding = Finding::new(Code::TD502, Unit::Percent);
-    let percent = 100.0 * across.reference_difference[0];
-    finding.value = Some(percent);
-    finding.evidence = vec![
-        Evidence::number("av_reference_width_px", av.reference[0]),
-        Evidence::number("ar_reference_width_px", ar.reference[0]),
-        Evidence::number("av_focal_px", av.focal_px),
-        Evidence::number("ar_focal_px", ar.focal_px),
-    ];
-    let dimensions = |sheet: &Sheet| format!("{}x{}", sheet.reference[0], sheet.reference[1]);
-    let numbers = format!(
-        "AVFoundation's reference dimensions are {}, ARKit's {} ({percent:+.1} %); depth focal lengths {:.2} and \
-         {:.2} px ({:+.1} %)",
-        dimensions(av),
-        dimensions(ar),
-        av.focal_px,
-        ar.focal_px,
-        100.0 * across.focal_difference
-    );
-    match across.issue {
-        Some(KnownIssue::DepthZoom) => {
-            finding.verdict = Verdict::Warning;
-            let zoom = across.depth_zoom[0];
-            finding.summary = format!(
-                "{numbers}: one camera, two reference dimensions. Under ARKit depth appears zoomed against colour \
-                 (issue 1 of the paper)."
-            );
-            finding.what_to_do = format!(
-                "Zoom ARKit's depth maps by {zoom:.4} about the principal point: `truedepth correct REC \
-                 --fault depth-zoom={zoom:.4}`. AVFoundation's are aligned."
-            );
-        }
-        Some(_) => {
-            finding.verdict = Verdict::Warning;
-            let vga_px = across.av_corrected_px * 640.0 / av.reference[0];
-            finding.summary = format!(
-                "{numbers}: neither focal length is the camera's (issue 2 of the paper). Corrected by the paper's \
-                 equations they are {:.2} px and {:.2} px, at 640 pixels {vga_px:.2} px and {:.2} px.",
-                across.av_corrected_px,
-                across.ar_corrected_px,
-                across.ar_corrected_px * 640.0 / ar.reference[0],
-            );
-            finding.what_to_do =
-                "Calibrate (`truedepth audit`), which is better than the equations; they are for \
-                                  devices that cannot be calibrated any more."
-                    .to_owned();
-            finding.correction = Some(Correction::Focal { focal_px: vga_px });
-        }
-        None => {
-            finding.verdict = Verdict::Ok;
-            finding.summary = format!("{numbers}: both APIs say the same.");
-        }
-    }
-    finding
 }
 
 /// All pairs of rows that are AVFoundation's and ARKit's view of one device and version.
@@ -246,6 +151,7 @@ pub fn pairs(registry: &Registry) -> Vec<Comparison> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::{Code, Verdict};
 
     fn of(first: &str, second: &str) -> Comparison {
         let registry = Registry::published();

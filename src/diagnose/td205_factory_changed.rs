@@ -1,7 +1,7 @@
 #![doc = include_str!("td205_factory_changed.md")]
 
-use super::{Case, Code, Evidence, Finding, Unit, Verdict};
-use crate::recording::{Factory, Problem};
+use super::{Case, Code, Evidence, Finding, SameApi, Side, Unit, Verdict};
+use crate::recording::Problem;
 
 /// Factory numbers are printed to six digits and more; what differs by less is rounding.
 const SAME_PERCENT: f64 = 1e-3;
@@ -40,33 +40,40 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
     finding
 }
 
-/// Between two recordings of one device at the same image size.
-pub fn factory_changed(first: &Factory, second: &Factory) -> Finding {
+/// Between two recordings of one device under one API.
+pub(super) fn between(first: &Side, second: &Side, same: &SameApi) -> Finding {
     let mut finding = Finding::new(Code::TD205, Unit::Percent);
-    let (a, b) = (&first.intrinsics, &second.intrinsics);
-    if [a.width, a.height] != [b.width, b.height] {
-        finding.summary = format!(
-            "Cannot compare factory calibrations for images of {}x{} and {}x{} px.",
-            a.width, a.height, b.width, b.height
-        );
-        finding.what_to_do = "Compare recordings of one image size.".to_owned();
-        return finding;
-    }
-    let percent = 100.0 * (b.focal_px() / a.focal_px() - 1.0);
-    let (dx, dy) = (b.cx - a.cx, b.cy - a.cy);
+    let percent = 100.0 * same.focal_difference;
     finding.value = Some(percent);
     finding.evidence = vec![
-        Evidence::number("first_focal_px", a.focal_px()),
-        Evidence::number("second_focal_px", b.focal_px()),
-        Evidence::number("center_change_x_px", dx),
-        Evidence::number("center_change_y_px", dy),
+        Evidence::number("first_focal_px", first.sheet.focal_px),
+        Evidence::number("second_focal_px", second.sheet.focal_px),
+        Evidence::number("center_shift_x_px", same.center_shift_px[0]),
+        Evidence::number("center_shift_y_px", same.center_shift_px[1]),
     ];
-    if percent.abs() <= SAME_PERCENT && dx.hypot(dy) <= 0.01 {
+    if !same.same_unit {
+        finding.verdict = Verdict::Unknown;
+        let [x, y] = same.center_shift_px;
+        finding.summary = format!(
+            "The two are not of one device, or its whole calibration was made anew: the principal points lie \
+             ({x:+.2}, {y:+.2}) px apart at the reference dimensions."
+        );
+        finding.what_to_do = "Compare recordings of one device.".to_owned();
+    } else if same.focal_difference.abs() <= SAME_PERCENT / 100.0 {
         finding.verdict = Verdict::Ok;
-        finding.summary = "Both recordings have the same factory calibration.".to_owned();
-        return finding;
+        finding.summary = "The factory calibration is the same in both.".to_owned();
+    } else {
+        finding.verdict = Verdict::Warning;
+        finding.summary = format!(
+            "The factory calibration of one device has changed: focal length {:.2} px, then {:.2} px at the reference \
+             dimensions ({percent:+.3} %), with principal point and distortion centre as before.",
+            first.sheet.focal_px, second.sheet.focal_px
+        );
+        finding.what_to_do = "Keep the metadata with each recording and use its own: the paper saw such a change with \
+                              an update of the system, and an iPhone shows one from recording to recording. It is no \
+                              sign that either value is right."
+            .to_owned();
     }
-    judge(&mut finding, percent, "between the recordings");
     finding
 }
 

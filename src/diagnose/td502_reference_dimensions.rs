@@ -1,7 +1,8 @@
 #![doc = include_str!("td502_reference_dimensions.md")]
 
-use super::{Case, Code, Evidence, Finding, Unit, Verdict};
-use crate::recording::Factory;
+use super::{
+    AcrossApis, Case, Code, Correction, Evidence, Finding, KnownIssue, Sheet, Unit, Verdict,
+};
 
 /// Within one recording there is nothing to disagree with; the numbers are stated.
 pub(super) fn check(case: &Case<'_>) -> Finding {
@@ -24,62 +25,60 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
     finding
 }
 
-/// AVFoundation's metadata against ARKit's, of one device.
-pub fn reference_dimensions(av_foundation: &Factory, ar_kit: &Factory) -> Finding {
+/// AVFoundation's parameters against ARKit's, of one device, and which correction the pair calls for.
+pub(super) fn between(av: &Sheet, ar: &Sheet, across: &AcrossApis) -> Finding {
     let mut finding = Finding::new(Code::TD502, Unit::Percent);
-    let both = (av_foundation.reference_dimensions, ar_kit.reference_dimensions);
-    let (Some([av_width, av_height]), Some([ar_width, ar_height])) = both else {
-        finding.summary =
-            "Cannot compare reference dimensions: one of the recordings does not tell them."
-                .to_owned();
-        finding.what_to_do =
-            "Record with an app that saves intrinsicMatrixReferenceDimensions.".to_owned();
-        return finding;
-    };
-    let percent = 100.0 * (ar_width / av_width - 1.0);
-    let zoom = av_width / ar_width;
-    // Intrinsics at the image's size, brought to the reference: the same lens has the same focal length there.
-    let unscaled = |factory: &Factory, width: f64| {
-        factory.intrinsics.fx * width / factory.intrinsics.width as f64
-    };
-    let focal_ratio = unscaled(ar_kit, ar_width) / unscaled(av_foundation, av_width);
+    let percent = 100.0 * across.reference_difference[0];
     finding.value = Some(percent);
     finding.evidence = vec![
-        Evidence::number("av_foundation_width_px", av_width),
-        Evidence::number("av_foundation_height_px", av_height),
-        Evidence::number("ar_kit_width_px", ar_width),
-        Evidence::number("ar_kit_height_px", ar_height),
-        Evidence::number("expected_zoom", zoom),
-        Evidence::number("focal_ratio_at_reference", focal_ratio),
+        Evidence::number("av_reference_width_px", av.reference[0]),
+        Evidence::number("ar_reference_width_px", ar.reference[0]),
+        Evidence::number("av_focal_px", av.focal_px),
+        Evidence::number("ar_focal_px", ar.focal_px),
     ];
-    let same = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-4;
-    if same(av_width, ar_width) && same(av_height, ar_height) {
-        finding.verdict = Verdict::Ok;
-        finding.summary = format!(
-            "Both APIs give their intrinsics for images of {av_width:.0}x{av_height:.0} px."
-        );
-    } else if same(focal_ratio, 1.0) {
-        finding.verdict = Verdict::Warning;
-        finding.summary = format!(
-            "AVFoundation gives its intrinsics for {av_width:.0}x{av_height:.0} px, ARKit the same numbers for \
-             {ar_width:.0}x{ar_height:.0} px ({percent:+.1} %): ARKit's depth is to be expected zoomed by {zoom:.4} \
-             against its colour (TD401)."
-        );
-        finding.what_to_do =
-            "Measure the zoom of the ARKit recording with a board (TD401), then resample \
-                              its depth."
-                .to_owned();
-    } else {
-        finding.verdict = Verdict::Warning;
-        finding.summary = format!(
-            "AVFoundation gives its intrinsics for {av_width:.0}x{av_height:.0} px, ARKit for \
-             {ar_width:.0}x{ar_height:.0} px ({percent:+.1} %), and the focal lengths differ by {:+.1} %: one of them \
-             is wrong (TD201).",
-            100.0 * (focal_ratio - 1.0)
-        );
-        finding.what_to_do =
-            "Calibrate with a board (TD201); do not trust either API's focal length until then."
-                .to_owned();
+    let dimensions = |sheet: &Sheet| format!("{}x{}", sheet.reference[0], sheet.reference[1]);
+    let numbers = format!(
+        "AVFoundation's reference dimensions are {}, ARKit's {} ({percent:+.1} %); depth focal lengths {:.2} and \
+         {:.2} px ({:+.1} %)",
+        dimensions(av),
+        dimensions(ar),
+        av.focal_px,
+        ar.focal_px,
+        100.0 * across.focal_difference
+    );
+    match across.issue {
+        Some(KnownIssue::DepthZoom) => {
+            finding.verdict = Verdict::Warning;
+            let zoom = across.depth_zoom[0];
+            finding.summary = format!(
+                "{numbers}: one camera, two reference dimensions. Under ARKit depth appears zoomed against colour \
+                 (issue 1 of the paper)."
+            );
+            finding.what_to_do = format!(
+                "Zoom ARKit's depth maps by {zoom:.4} about the principal point: `truedepth correct REC \
+                 --fault depth-zoom={zoom:.4}`. AVFoundation's are aligned."
+            );
+        }
+        Some(_) => {
+            finding.verdict = Verdict::Warning;
+            let vga_px = across.av_corrected_px * 640.0 / av.reference[0];
+            finding.summary = format!(
+                "{numbers}: neither focal length is the camera's (issue 2 of the paper). Corrected by the paper's \
+                 equations they are {:.2} px and {:.2} px, at 640 pixels {vga_px:.2} px and {:.2} px.",
+                across.av_corrected_px,
+                across.ar_corrected_px,
+                across.ar_corrected_px * 640.0 / ar.reference[0],
+            );
+            finding.what_to_do =
+                "Calibrate (`truedepth audit`), which is better than the equations; they are for \
+                                  devices that cannot be calibrated any more."
+                    .to_owned();
+            finding.correction = Some(Correction::Focal { focal_px: vga_px });
+        }
+        None => {
+            finding.verdict = Verdict::Ok;
+            finding.summary = format!("{numbers}: both APIs say the same.");
+        }
     }
     finding
 }

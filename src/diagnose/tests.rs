@@ -3,8 +3,8 @@
 use std::sync::LazyLock;
 
 use super::{
-    Case, Code, Correction, DistortionState, Finding, Tolerances, Verdict, diagnose,
-    factory_changed, reference_dimensions,
+    Api, Case, Code, Correction, DistortionState, Finding, Sheet, Side, Tolerances, Verdict,
+    compare, diagnose,
 };
 use crate::{
     board::{CharucoBoard, Layout},
@@ -449,28 +449,33 @@ fn a_wrong_principal_point() {
     assert!((x - 318.9).abs() < 1.0 && (y - 239.8).abs() < 1.0, "{finding:?}");
 }
 
-/// What the paper's tables of metadata say, device by device.
+/// What the metadata of two recordings say, without a registry.
 #[test]
 fn two_recordings() {
-    let factory = |width: f64, focal_px: f64| {
+    let side = |width: f64, focal_px: f64, api| {
         let mut factory = Factory::pinhole(pinhole(focal_px * 640.0 / width));
         factory.reference_dimensions = Some([width, 0.75 * width]);
-        factory
+        Side { name: "r".to_owned(), api, sheet: Sheet::from_factory(&factory).unwrap() }
     };
-    let first_issue = reference_dimensions(&factory(3088.0, 2872.5), &factory(3248.0, 2872.5));
-    assert_eq!(first_issue.verdict, Verdict::Warning);
-    let zoom = first_issue.evidence.iter().find(|e| e.name == "expected_zoom").unwrap().value;
-    assert!((zoom - 0.9507).abs() < 1e-4);
-    let second = reference_dimensions(&factory(2016.0, 1781.8), &factory(2880.0, 1916.2));
-    assert!(second.summary.contains("TD201"), "{second:?}");
-    let iphone = reference_dimensions(&factory(4032.0, 2751.0), &factory(4032.0, 2751.0));
-    assert_eq!(iphone.verdict, Verdict::Ok);
+    let pair = |av: (f64, f64), ar: (f64, f64)| {
+        let sides = [(av, Api::AvFoundation), (ar, Api::ArKit)];
+        let [first, second] = sides.map(|((width, focal), api)| side(width, focal, Some(api)));
+        compare(first, second)
+    };
+    let first = pair((3088.0, 2872.5), (3248.0, 2872.5));
+    assert_eq!(first.findings[0].verdict, Verdict::Warning);
+    assert!(first.findings[0].what_to_do.contains("0.9507"), "{first:?}");
+    let second = pair((2016.0, 1781.8), (2880.0, 1916.2));
+    assert!(second.findings[0].summary.contains("issue 2"), "{second:?}");
+    let iphone = pair((4032.0, 2751.0), (4032.0, 2751.0));
+    assert_eq!(iphone.findings[0].verdict, Verdict::Ok);
 
-    let change =
-        |focal_px| factory_changed(&factory(2016.0, 1781.78), &factory(2016.0, focal_px)).verdict;
+    let change = |focal_px| {
+        let pair = compare(side(2016.0, 1781.78, None), side(2016.0, focal_px, None));
+        pair.findings[0].verdict
+    };
     assert_eq!(change(1781.78), Verdict::Ok);
-    assert_eq!(change(1780.13), Verdict::Info); // iOS 15 on the 12.9-inch 5th generation
-    assert_eq!(change(1916.17), Verdict::Warning);
+    assert_eq!(change(1780.13), Verdict::Warning); // iOS 15 on the 12.9-inch 5th generation
 }
 
 /// A board of another layout than was taken for granted leaves 4.8 px, and focal lengths that are wrong by percents.

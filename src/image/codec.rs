@@ -350,18 +350,32 @@ fn encode(
     encode_with(size, color, depth, data, |_| ())
 }
 
-fn encode_with(
+pub(super) fn side(n: usize) -> u32 {
+    u32::try_from(n).expect("an image in memory has fewer than 2³² columns")
+}
+
+/// An encoder for images of this kind.
+pub(super) fn start(
+    bytes: &mut Vec<u8>,
     (width, height): (usize, usize),
+    color: png::ColorType,
+    depth: png::BitDepth,
+) -> png::Encoder<'static, &mut Vec<u8>> {
+    let mut encoder = png::Encoder::new(bytes, side(width), side(height));
+    encoder.set_color(color);
+    encoder.set_depth(depth);
+    encoder
+}
+
+fn encode_with(
+    size: (usize, usize),
     color: png::ColorType,
     depth: png::BitDepth,
     data: &[u8],
     more: impl FnOnce(&mut png::Encoder<'_, &mut Vec<u8>>),
 ) -> Vec<u8> {
-    let side = |n: usize| u32::try_from(n).expect("an image in memory has fewer than 2³² columns");
     let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, side(width), side(height));
-    encoder.set_color(color);
-    encoder.set_depth(depth);
+    let mut encoder = start(&mut bytes, size, color, depth);
     encoder.set_compression(png::Compression::Fast);
     more(&mut encoder);
     encoder

@@ -38,6 +38,11 @@ impl DepthMap {
         if x < self.width && y < self.height { self.depth_m[y * self.width + x] } else { f32::NAN }
     }
 
+    /// Every row the other way round.
+    pub fn mirrored(&self) -> Self {
+        Self::new(self.width, self.height, super::mirrored(self.width, &self.depth_m))
+    }
+
     /// Bilinear interpolation, metres; `None` outside the rectangle of pixel centres and wherever any of the
     /// neighbours with a weight has no measurement: depth never blends across a hole.
     pub fn bilinear(&self, at: Pixel) -> Option<f64> {

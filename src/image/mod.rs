@@ -5,6 +5,7 @@
 //!
 //! Not here: files (bytes in, bytes out in `codec`), what the pixels show.
 
+mod animation;
 mod codec;
 mod depth_map;
 mod gray;
@@ -12,7 +13,13 @@ mod jpeg;
 mod rgb;
 mod unfiltered;
 
+pub use animation::animated_png;
 pub use codec::{Error, Limits};
 pub use depth_map::DepthMap;
 pub use gray::Gray;
 pub use rgb::Rgb;
+
+/// Every row the other way round.
+fn mirrored<T: Copy>(width: usize, pixels: &[T]) -> Vec<T> {
+    pixels.chunks(width.max(1)).flat_map(|row| row.iter().rev().copied()).collect()
+}

@@ -32,6 +32,11 @@ impl Rgb {
         &self.pixels
     }
 
+    /// Every row the other way round.
+    pub fn mirrored(&self) -> Self {
+        Self::new(self.width, self.height, super::mirrored(self.width, &self.pixels))
+    }
+
     /// The luma of ITU-R BT.601, as OpenCV's `COLOR_RGB2GRAY` rounds it.
     pub fn to_gray(&self) -> Gray {
         Gray::new(self.width, self.height, self.pixels.iter().map(|&p| luma(p)).collect())

@@ -25,10 +25,15 @@
 //!
 //! Not here: files (callers write what they are given), colours of a terminal, verdicts.
 
+mod depth_pictures;
+mod depth_style;
+mod drawing;
 mod error;
 mod figures;
+mod frames;
 mod html;
 mod json;
+mod lens_pictures;
 mod overlay;
 mod photo;
 mod pictures;
@@ -41,9 +46,12 @@ mod words;
 #[cfg(test)]
 mod sample;
 
+pub use depth_pictures::{After, Animation, DepthPictures, Drawn, DrawnFrame, Flip, Range};
+pub use depth_style::{DepthStyle, Shown, depth_range_m};
 pub use error::Error;
 pub use html::page;
 pub use json::to_json;
+pub use lens_pictures::{LensDrawn, LensFrame, LensPictures, state_in_words};
 pub use overlay::Overlay;
 pub use photo::{Photo, PhotoSize};
 pub use pictures::{Closeup, Pictures};

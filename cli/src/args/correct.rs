@@ -90,6 +90,7 @@ impl WhatArgs {
 }
 
 /// Where the corrections come from.
+#[derive(Clone, Copy)]
 pub(crate) enum Steps<'a> {
     Audit,
     With(&'a std::path::Path),

@@ -15,7 +15,7 @@ use truedepth::{
 
 use super::audit::observed;
 use crate::{
-    args::{CorrectArgs, SamplingChoice, Steps},
+    args::{CorrectArgs, DevicesArgs, InputArgs, SamplingChoice, Steps},
     failure::Failure,
     input,
     outcome::Outcome,
@@ -30,7 +30,17 @@ pub(crate) fn run(args: &CorrectArgs, terminal: &Terminal) -> Result<Outcome, Fa
     let recording = Recording::open(&args.recording, &input::limits(&args.input))?;
     // A folder that must not be written is better known before the work than after.
     let mut sink = WholeFolder::create(&args.output)?;
-    let (mut plan, findings) = plan(args, &recording, terminal)?;
+    let asked = Asked {
+        path: &args.recording,
+        steps: args.what.chosen(),
+        sampling: match args.sampling {
+            SamplingChoice::EdgeAware => Sampling::EdgeAware,
+            SamplingChoice::Nearest => Sampling::Nearest,
+        },
+        devices: &args.devices,
+        input: &args.input,
+    };
+    let (mut plan, findings) = plan(&asked, &recording, terminal)?;
     if !args.only.is_empty() {
         let names: Vec<&str> = args.only.iter().map(String::as_str).collect();
         plan = plan.only(&names);
@@ -58,16 +68,23 @@ pub(crate) fn run(args: &CorrectArgs, terminal: &Terminal) -> Result<Outcome, Fa
     Ok(Outcome::Clean)
 }
 
+/// What was asked for.
+pub(super) struct Asked<'a> {
+    /// Of this recording.
+    pub(super) path: &'a Path,
+    pub(super) steps: Steps<'a>,
+    pub(super) sampling: Sampling,
+    pub(super) devices: &'a DevicesArgs,
+    pub(super) input: &'a InputArgs,
+}
+
 /// What is to be done, and the findings that ask for it.
-fn plan(
-    args: &CorrectArgs,
+pub(super) fn plan(
+    asked: &Asked<'_>,
     recording: &Recording,
     terminal: &Terminal,
 ) -> Result<(Plan, Vec<wire::FindingInfo>), Failure> {
-    let sampling = match args.sampling {
-        SamplingChoice::EdgeAware => Sampling::EdgeAware,
-        SamplingChoice::Nearest => Sampling::Nearest,
-    };
+    let sampling = asked.sampling;
     let by_audit = |audit: &wire::Audit| -> Result<_, Failure> {
         let plan = audit.plan(sampling)?;
         for finding in audit.faults() {
@@ -75,10 +92,10 @@ fn plan(
         }
         Ok((plan, audit.faults().cloned().collect()))
     };
-    match args.what.chosen() {
+    match asked.steps {
         Steps::Audit => {
             let mut options = Options::new(Method::Auto);
-            options.board = input::board(&args.input.board)?;
+            options.board = input::board(&asked.input.board)?;
             by_audit(&wire::Audit::from(&observed(recording, &options, terminal)?))
         }
         Steps::With(path) => match input::document(path)? {
@@ -91,24 +108,21 @@ fn plan(
             })?;
             Ok((Plan::from_faults(faults.iter().copied(), &said, sampling)?, Vec::new()))
         }
-        Steps::Pair { av, ar } => {
-            Ok((by_equations(args, recording, av, ar, sampling)?, Vec::new()))
-        }
+        Steps::Pair { av, ar } => Ok((by_equations(asked, recording, av, ar)?, Vec::new())),
     }
 }
 
 /// The paper's equations from both APIs' metadata.
 fn by_equations(
-    args: &CorrectArgs,
+    asked: &Asked<'_>,
     recording: &Recording,
     av: Option<&str>,
     ar: Option<&str>,
-    sampling: Sampling,
 ) -> Result<Plan, Failure> {
-    let registry = input::registry(args.devices.devices.as_deref())?;
-    let shown = args.recording.display().to_string();
+    let registry = input::registry(asked.devices.devices.as_deref())?;
+    let shown = asked.path.display().to_string();
     let side = |text: Option<&str>, api: Api| -> Result<diagnose::Side, Failure> {
-        let side = input::side(text.unwrap_or(&shown), &registry, &args.input)?;
+        let side = input::side(text.unwrap_or(&shown), &registry, asked.input)?;
         Ok(diagnose::Side { api: Some(api), ..side })
     };
     let pair = diagnose::compare(side(av, Api::AvFoundation)?, side(ar, Api::ArKit)?);
@@ -127,11 +141,11 @@ fn by_equations(
         _ => None,
     };
     let steps = step.into_iter().map(|step| (step, Because::Equations)).collect();
-    Ok(Plan::because(steps, sampling)?)
+    Ok(Plan::because(steps, asked.sampling)?)
 }
 
 /// The output must not lie in the input, nor the other way round.
-fn refuse_inside(output: &Path, input: &Path) -> Result<(), Failure> {
+pub(super) fn refuse_inside(output: &Path, input: &Path) -> Result<(), Failure> {
     let (Some(output), Some(input)) = (resolved(output), resolved(input)) else { return Ok(()) };
     if output.starts_with(&input) || input.starts_with(&output) {
         let message = format!(

@@ -11,7 +11,9 @@ mod detect;
 mod explain;
 mod inspect;
 mod man;
+mod overlay;
 mod simulate;
+mod undistort;
 
 use crate::{
     args::{Args, Command},
@@ -34,6 +36,8 @@ pub(crate) fn dispatch(args: Args, terminal: &Terminal) -> Result<Outcome, Failu
         Command::Inspect(args) => inspect::run(&args, terminal),
         Command::Compare(args) => compare::run(&args, terminal),
         Command::Correct(args) => correct::run(&args, terminal),
+        Command::Overlay(args) => overlay::run(&args, terminal),
+        Command::Undistort(args) => undistort::run(&args, terminal),
         Command::Calibrate(args) => calibrate::run(&args, terminal),
         Command::Demo(args) => demo::run(&args, terminal),
         Command::Simulate(args) => simulate::run(&args, terminal),

@@ -6,6 +6,7 @@ mod board;
 mod calibrate;
 mod correct;
 mod detect;
+mod pictures;
 mod scratch;
 mod usage;
 

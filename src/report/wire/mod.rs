@@ -19,6 +19,7 @@ mod calibration;
 mod correct;
 mod detect;
 mod devices;
+mod pictures;
 
 pub use audit::{
     Alignment, Audit, Board, CorrectionInfo, Depth, DepthNoise, DeviceInfo, EvidenceInfo,
@@ -31,6 +32,7 @@ pub use calibration::{
 pub use correct::{Correct, PinholeInfo, StepInfo};
 pub use detect::{Detect, DetectedCorner, DetectedIdentity, DetectedImage, RejectedCorner};
 pub use devices::{Compare, IdentityInfo, Inspect, PairCorrections, PairInfo, SheetInfo, SideInfo};
+pub use pictures::{Overlay, OverlayFrame, TreatmentsInfo, Undistort, UndistortFrame};
 
 use serde::{Deserialize, Serialize};
 
@@ -59,6 +61,12 @@ pub enum Document {
     /// What `truedepth correct --json` prints and `provenance.json` holds.
     #[serde(rename = "truedepth.correct/1")]
     Correct(Box<Correct>),
+    /// What `truedepth overlay --json` prints.
+    #[serde(rename = "truedepth.overlay/1")]
+    Overlay(Box<Overlay>),
+    /// What `truedepth undistort --json` prints.
+    #[serde(rename = "truedepth.undistort/1")]
+    Undistort(Box<Undistort>),
 }
 
 impl Document {
@@ -90,12 +98,15 @@ mod tests {
     use super::*;
     use crate::{
         camera::{self, Brown, RadialTable, TablePair},
-        correct::{Because, Plan, Sampling, Step},
+        correct::{Because, BoardLine, Plan, Rectifier, Sampling, Step},
         detect::Observation,
         diagnose,
         geom::Pixel,
         recording::Memory,
-        report::{sample, to_json},
+        report::{
+            After, Animation, DepthPictures, DepthStyle, Flip, LensPictures, Range, Shown, sample,
+            to_json,
+        },
     };
 
     fn golden(name: &str, document: &Document) {
@@ -159,6 +170,60 @@ mod tests {
         document.input_sha256.replace_range(.., "...");
         document.files.retain(|name, _| !name.ends_with(".png"));
         golden("correct.json", &Document::Correct(Box::new(document)));
+    }
+
+    #[test]
+    fn overlay() {
+        let recording = sample::recording();
+        let plan = Plan::because(
+            vec![(Step::DepthZoom { zoom: [0.95; 2] }, Because::Told)],
+            Sampling::EdgeAware,
+        );
+        let plan = plan.unwrap();
+        let pictures = DepthPictures {
+            recording: &recording,
+            after: After::Corrected(&plan),
+            frames: None,
+            range: Range::Given([0.2, 0.3]),
+            style: DepthStyle { range_m: [0.2, 0.3], opacity: 0.5, shown: Shown::Depth },
+            flip: Flip::No,
+            animation: Animation::Yes,
+        };
+        let mut sink = Memory::new("pictures");
+        let drawn = pictures.draw(&mut sink, &mut |_, _| ()).unwrap();
+        assert_eq!(sink.files().len(), 2, "a picture and an animation; no sheet of one");
+        golden("overlay.json", &Document::Overlay(Box::new(Overlay::new(&pictures, &drawn))));
+    }
+
+    #[test]
+    fn undistort() {
+        let recording = sample::recording();
+        let table = |sign: f64| {
+            let magnification = (0..42).map(|i| sign * 1e-5 * f64::from(i * i)).collect();
+            RadialTable::new(Pixel::new(320.5, 241.1), 400.25, magnification).unwrap()
+        };
+        let rectifier =
+            Rectifier::Tables(Box::new(TablePair { forward: table(1.0), inverse: table(-1.0) }));
+        let pictures = LensPictures {
+            recording: &recording,
+            rectifier: &rectifier,
+            board: recording.board.as_ref(),
+            frames: Some(vec![0]),
+        };
+        let mut sink = Memory::new("pictures");
+        let mut drawn = pictures.draw(&mut sink, &mut |_, _| ()).unwrap();
+        assert_eq!(drawn.straightness.n_frames(), 0, "there is no board in the sample's image");
+        // What it looks like with numbers.
+        let line = |bow: f64| {
+            vec![BoardLine {
+                points: (0..5).map(|i| Pixel::new(f64::from(i), bow * f64::from(i % 2))).collect(),
+                on_line: (0..5).map(|i| Pixel::new(f64::from(i), 0.4 * bow)).collect(),
+            }]
+        };
+        drawn.straightness.add([&line(0.5), &line(0.25), &line(1.0)]);
+        drawn.frames[0].rms_px = drawn.straightness.rms_px();
+        let document = Undistort::new(&recording, &rectifier, &drawn);
+        golden("undistort.json", &Document::Undistort(Box::new(document)));
     }
 
     #[test]
