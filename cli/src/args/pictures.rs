@@ -10,8 +10,8 @@ use super::{InputArgs, JsonArgs, correct::WhatArgs, paper::DevicesArgs};
 ///
 /// One picture per frame: the colour image in grey, under it every pixel's depth in the colours of viridis (equal steps
 /// look equally large, also to the colour-blind), a bar that says how many millimetres each colour is, and dark red
-/// stripes where the sensor measured nothing. With --edges it draws lines instead where depth jumps: they must lie where
-/// things end in the colour image. With one of --with, --fault, --av, --ar or --audit each picture has two panels,
+/// stripes where the sensor measured nothing. With --edges it draws lines instead where depth jumps: they must lie
+/// where things end in the colour image. With one of --with, --fault, --av, --ar or --audit each picture has two panels,
 /// before and after.
 ///
 /// Writes overlay_TIMESTAMP.png, sheet.png (up to 48 frames at a glance), and with --animate overlay.apng (any browser
@@ -19,12 +19,8 @@ use super::{InputArgs, JsonArgs, correct::WhatArgs, paper::DevicesArgs};
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = OVERLAY_EXAMPLES,
-    mut_arg("with", |arg| arg.value_name("FILE|REC").help("Beside it: corrected by a calibration or a report, or another recording").long_help(
-        "Beside it: corrected by a calibration or a report, or another recording\n\n\
-         What `truedepth calibrate --json` printed; the report.json of an audit; or a recording whose frames have the \
-         same timestamps, like what `truedepth correct` wrote."
-    )),
-    mut_arg("faults", |arg| arg.help("Beside it: corrected for this fault, as `correct` does; may be given several times"))
+    mut_arg("with", |arg| arg.value_name("FILE|REC").help(WITH).long_help(WITH_LONG)),
+    mut_arg("faults", |arg| arg.help(FAULT))
 )]
 pub(crate) struct OverlayArgs {
     /// The recording: a folder as the capture app writes it, or a zip of it
@@ -77,6 +73,14 @@ pub(crate) struct OverlayArgs {
     #[command(flatten)]
     pub(crate) json: JsonArgs,
 }
+
+const WITH: &str = "Beside it: corrected by a calibration or a report, or another recording";
+const WITH_LONG: &str = "Beside it: corrected by a calibration or a report, or another recording
+
+What `truedepth calibrate --json` printed; the report.json of an audit; or a recording whose frames have the same \
+timestamps, like what `truedepth correct` wrote.";
+const FAULT: &str =
+    "Beside it: corrected for this fault, as `correct` does; may be given several times";
 
 const OVERLAY_EXAMPLES: &str = "\
 Examples:
