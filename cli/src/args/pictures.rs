@@ -11,8 +11,8 @@ use super::{InputArgs, JsonArgs, correct::WhatArgs, paper::DevicesArgs};
 /// One picture per frame: the colour image in grey, under it every pixel's depth in the colours of viridis (equal steps
 /// look equally large, also to the colour-blind), a bar that says how many millimetres each colour is, and dark red
 /// stripes where the sensor measured nothing. With --edges it draws lines instead where depth jumps: they must lie
-/// where things end in the colour image. With one of --with, --fault, --av, --ar or --audit each picture has two panels,
-/// before and after.
+/// where things end in the colour image. With one of --with, --fault, --av, --ar or --audit each picture has two
+/// panels, before and after.
 ///
 /// Writes overlay_TIMESTAMP.png, sheet.png (up to 48 frames at a glance), and with --animate overlay.apng (any browser
 /// plays it). The folder appears as a whole or not at all.
@@ -112,8 +112,8 @@ pub(crate) struct UndistortArgs {
 
     /// Take the lens from a calibration instead of the recording's tables
     ///
-    /// What `truedepth calibrate --json` printed, or the report.json of an audit; its model must have a distortion, like
-    /// that of `calibrate --model brown`.
+    /// What `truedepth calibrate --json` printed, or the report.json of an audit; its model must have a distortion,
+    /// like that of `calibrate --model brown`.
     #[arg(long, value_name = "FILE")]
     pub(crate) with: Option<PathBuf>,
 
