@@ -45,6 +45,8 @@ pub struct Registration {
     pub range_m: [f64; 2],
     /// Frames with depth on the board.
     pub n_frames: usize,
+    /// Which they are: indices in the recording, ascending.
+    pub frames: Vec<usize>,
     /// Patches of the depth maps on the board.
     pub n_patches: usize,
     /// What is left: by frame, over the image, from pixel to pixel.
@@ -188,6 +190,8 @@ struct Sight {
 
 /// What one frame says.
 pub(super) struct Plane {
+    /// Index of the frame in the recording.
+    frame: usize,
     /// By which plane the sensor differs from the model.
     beta: Vector3<f64>,
     /// By the five numbers.
@@ -353,6 +357,7 @@ impl Scene<'_> {
         }
         let depths = sights.iter().map(|(_, s)| s.board_m);
         Some(Plane {
+            frame: stance.frame,
             beta,
             gain,
             by_camera,
@@ -516,6 +521,8 @@ fn assemble(
     let estimate =
         |k: usize| Estimate { value: theta[k], sigma: covariance[(k, k)].max(0.0).sqrt() };
     let n_patches = planes.iter().map(|p| p.n_patches).sum::<usize>();
+    let mut frames_used: Vec<usize> = planes.iter().map(|p| p.frame).collect();
+    frames_used.sort_unstable();
     let mut holes = Holes::default();
     let mut residuals = Vec::with_capacity(n_patches);
     for (stance, patches) in frames {
@@ -551,6 +558,7 @@ fn assemble(
             planes.iter().map(|p| p.board_m[2]).fold(0.0, f64::max),
         ],
         n_frames: planes.len(),
+        frames: frames_used,
         n_patches,
         pattern: Pattern::new(&input.camera.intrinsics, &residuals, holes),
     }

@@ -62,4 +62,7 @@ pub use device::{Device, DistortionState, Sensor};
 pub use finding::{Correction, Evidence, Finding, Tolerances, Unit, Verdict};
 pub use inspect::{Inspection, inspect};
 pub use pair::{AcrossApis, Comparison, SameApi, Side, compare, pairs};
-pub use registry::{Api, Certainty, Entry, Identity, KnownIssue, Registry, RegistryError, Sheet};
+pub use registry::{
+    Api, Certainty, Entry, Identity, KnownIssue, PaperFocal, Registry, RegistryError, Sheet,
+    paper_focals,
+};

@@ -49,6 +49,7 @@ mod sample;
 pub use depth_pictures::{After, Animation, DepthPictures, Drawn, DrawnFrame, Flip, Range};
 pub use depth_style::{DepthStyle, Shown, depth_range_m};
 pub use error::Error;
+pub use figures::FIGURES;
 pub use html::page;
 pub use json::to_json;
 pub use lens_pictures::{LensDrawn, LensFrame, LensPictures, state_in_words};

@@ -1,10 +1,12 @@
 //! Devices and what is published of their factory calibration, with the issues each is known to have.
 
 mod identify;
+mod paper;
 mod published;
 mod user;
 
 pub use identify::{Certainty, Identity};
+pub use paper::{PaperFocal, paper_focals};
 pub use user::RegistryError;
 
 use crate::recording::Factory;

@@ -1,4 +1,4 @@
-//! The focal length beside the factory's.
+//! The focal length beside the factory's, and beside what is published of devices like this one.
 
 use maud::html;
 
@@ -6,7 +6,7 @@ use super::{Figure, Key, Table};
 use crate::{
     audit::Audit,
     calibrate::Estimate,
-    diagnose::Code,
+    diagnose::{Api, Certainty, Code, Registry, Sheet, paper_focals},
     report::{
         svg::{Margins, Plot, domain_of, n},
         words::{self, plain, signed, value_and_sigma},
@@ -15,7 +15,7 @@ use crate::{
 
 const ROW: f64 = 30.0;
 
-/// The own focal length, its two halves and that of every model tried, beside the factory's.
+/// The own focal length, its two halves and that of every model tried, beside the factory's and published ones.
 pub(in crate::report) fn focal_lengths(audit: &Audit) -> Option<Figure> {
     let calibration = audit.calibration.as_ref()?;
     let factory = audit.factory.as_ref().map(|factory| factory.intrinsics.focal_px());
@@ -34,6 +34,9 @@ pub(in crate::report) fn focal_lengths(audit: &Audit) -> Option<Figure> {
         let name = format!("{}{chosen}", words::model_short(candidate.model));
         estimates.push((name, candidate.focal_px, "series-candidate"));
     }
+    let published = published(audit);
+    let has_published = !published.is_empty();
+    estimates.extend(published);
     estimates.retain(|(_, estimate, _)| estimate.value.is_finite());
     let spread = |estimate: &Estimate| {
         // A σ beyond a tenth of the value tells nothing; it must not squeeze the others.
@@ -69,8 +72,10 @@ pub(in crate::report) fn focal_lengths(audit: &Audit) -> Option<Figure> {
             @let [low, high] = spread(estimate);
             g class=(class) {
                 text class="row" x="0" y=(y) dominant-baseline="central" { (name) }
-                line class="whisker" x1=(n(plot.x.at(low))) x2=(n(plot.x.at(high))) y1=(y) y2=(y) {}
-                circle class="mark dot" cx=(n(plot.x.at(estimate.value))) cy=(y) r="5"
+                @if high > low {
+                    line class="whisker" x1=(n(plot.x.at(low))) x2=(n(plot.x.at(high))) y1=(y) y2=(y) {}
+                }
+                circle class="mark dot" cx=(n(plot.x.at(estimate.value))) cy=(y) r=(if high > low { "5" } else { "4" })
                     data-tip=(format!("{name}: {} px", value_and_sigma(*estimate, 2))) {}
             }
         }
@@ -98,13 +103,22 @@ pub(in crate::report) fn focal_lengths(audit: &Audit) -> Option<Figure> {
         title: "Focal length beside the factory's".to_owned(),
         caption: format!(
             "{against}Points with 3 σ; the shaded band is what still counts as true. Where both halves of the views \
-             agree within their σ, the σ can be believed."
+             agree within their σ, the σ can be believed.{}",
+            if has_published {
+                " Rings are published without σ: factory values of this camera, and what the paper measured of it."
+            } else {
+                ""
+            }
         ),
-        legend: vec![
-            Key { class: "series-own", words: "measured" },
-            Key { class: "series-half", words: "from half of the views" },
-            Key { class: "series-candidate", words: "other camera models" },
-        ],
+        legend: [
+            Some(Key { class: "series-own", words: "measured" }),
+            Some(Key { class: "series-half", words: "from half of the views" }),
+            Some(Key { class: "series-candidate", words: "other camera models" }),
+            has_published.then_some(Key { class: "series-published", words: "published" }),
+        ]
+        .into_iter()
+        .flatten()
+        .collect(),
         view_box: plot.view_box(),
         drawing,
         table: Table {
@@ -112,4 +126,35 @@ pub(in crate::report) fn focal_lengths(audit: &Audit) -> Option<Figure> {
             rows: factory_row.into_iter().chain(estimate_rows).collect(),
         },
     })
+}
+
+/// What is published of this camera, at the size of these images: factory values of the registry, and what the paper
+/// measured (arXiv:2201.10865, section 5.1) of the same devices by the same API.
+fn published(audit: &Audit) -> Vec<(String, Estimate, &'static str)> {
+    let Some(factory) = &audit.factory else { return Vec::new() };
+    let Some(sheet) = Sheet::from_factory(factory) else { return Vec::new() };
+    let registry = Registry::published();
+    let identity = registry.identify(&sheet);
+    if identity.certainty < Certainty::Camera {
+        return Vec::new();
+    }
+    let width = factory.intrinsics.width as f64;
+    let without_sigma = |value| Estimate { value, sigma: f64::NAN };
+    let row = |name: String, value| (name, without_sigma(value), "series-published");
+    let mut rows: Vec<_> = identity
+        .matches
+        .iter()
+        .map(|e| row(format!("{} {}", e.device, e.version), e.sheet.focal_at_px(width)))
+        .collect();
+    // The paper calibrated at 640 columns, by AVFoundation.
+    let is_like_the_paper = |device: &str| {
+        width == 640.0
+            && identity.matches.iter().any(|e| e.api == Api::AvFoundation && e.device == device)
+    };
+    let measured = paper_focals().into_iter().filter(|paper| is_like_the_paper(paper.device));
+    rows.extend(measured.map(|paper| {
+        let name = format!("paper, {} {}", paper.device, paper.unit);
+        row(name.trim_end().to_owned(), paper.charuco_px)
+    }));
+    rows
 }

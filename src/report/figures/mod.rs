@@ -3,26 +3,69 @@
 //! Marks that carry a number have the class `mark` and an attribute `data-tip`; the page's script shows it under a
 //! pointer and, with the arrow keys, under the keyboard.
 
+mod board_shape;
+mod coverage;
 mod density;
 mod depth_error;
 mod depth_histogram;
+mod depth_map;
 mod finding_gauge;
 mod focal;
+mod heat;
 mod hypotheses;
 mod residuals;
+mod uncertainty;
 mod view_rms;
 
 use maud::{Markup, html};
 
-use crate::report::words::unbroken;
+use crate::{audit::Audit, pose::View, report::words::unbroken};
 
+pub(super) use board_shape::board_shape;
+pub(super) use coverage::{image_coverage, view_angles};
 pub(super) use depth_error::{error_by_frame, error_by_range, error_histogram};
 pub(super) use depth_histogram::depth_histograms;
+pub(super) use depth_map::{error_map, noise_map, pattern_map};
 pub(super) use finding_gauge::finding_gauge;
 pub(super) use focal::focal_lengths;
 pub(super) use hypotheses::{rms_by_lens, rms_by_model};
 pub(super) use residuals::residual_field;
+pub(super) use uncertainty::projection_uncertainty;
 pub(super) use view_rms::rms_by_view;
+
+/// The ids of all figures, in the order of the page: `report.html#residuals` opens at that one. A figure whose data a
+/// recording does not have is left out.
+pub const FIGURES: [&str; 17] = [
+    "depth-factory",
+    "depth-own",
+    "depth-error",
+    "depth-frames",
+    "depth-range",
+    "depth-map",
+    "depth-pattern",
+    "depth-noise",
+    "focal",
+    "lens",
+    "models",
+    "uncertainty",
+    "residuals",
+    "views",
+    "coverage",
+    "angles",
+    "board-shape",
+];
+
+/// The views that the calibration rests on; without one, those with the own camera or the factory's.
+fn views_of(audit: &Audit) -> Vec<&View> {
+    match &audit.calibration {
+        Some(calibration) => calibration.views.iter().collect(),
+        None => audit
+            .frames
+            .iter()
+            .filter_map(|f| f.own_view.as_ref().or(f.factory_view.as_ref()))
+            .collect(),
+    }
+}
 
 /// A figure of the page.
 pub(super) struct Figure {

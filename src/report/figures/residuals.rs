@@ -2,11 +2,10 @@
 
 use maud::html;
 
-use super::{Figure, Key, Table};
+use super::{Figure, Key, Table, views_of};
 use crate::{
     audit::Audit,
     geom::Pixel,
-    pose::View,
     report::{
         svg::{WIDTH, n, round_step},
         words::{plain, signed},
@@ -21,14 +20,7 @@ const MIN_CORNERS: usize = 4;
 /// The residual of every corner of every view, and their means over cells of the image.
 pub(in crate::report) fn residual_field(audit: &Audit) -> Option<Figure> {
     let [columns, rows] = audit.frames.iter().find_map(|frame| frame.size_px)?;
-    let views: Vec<&View> = match &audit.calibration {
-        Some(calibration) => calibration.views.iter().collect(),
-        None => audit
-            .frames
-            .iter()
-            .filter_map(|f| f.own_view.as_ref().or(f.factory_view.as_ref()))
-            .collect(),
-    };
+    let views = views_of(audit);
     let residuals: Vec<(Pixel, [f64; 2])> = views
         .iter()
         .flat_map(|view| view.corners.iter().zip(&view.residuals_px))

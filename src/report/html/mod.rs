@@ -77,10 +77,23 @@ fn evidence(audit: &Audit) -> [(&'static str, &'static str, &'static str, Vec<Fi
         .into_iter()
         .chain(figures::error_histogram(audit))
         .chain(figures::error_by_frame(audit))
-        .chain(figures::error_by_range(audit));
-    let camera =
-        [figures::focal_lengths(audit), figures::rms_by_lens(audit), figures::rms_by_model(audit)];
-    let trust = [figures::residual_field(audit), figures::rms_by_view(audit)];
+        .chain(figures::error_by_range(audit))
+        .chain(figures::error_map(audit))
+        .chain(figures::pattern_map(audit))
+        .chain(figures::noise_map(audit));
+    let camera = [
+        figures::focal_lengths(audit),
+        figures::rms_by_lens(audit),
+        figures::rms_by_model(audit),
+        figures::projection_uncertainty(audit),
+    ];
+    let trust = [
+        figures::residual_field(audit),
+        figures::rms_by_view(audit),
+        figures::image_coverage(audit),
+        figures::view_angles(audit),
+        figures::board_shape(audit),
+    ];
     [
         ("depth", "Depth", "Is the depth true?", depth.collect()),
         (
