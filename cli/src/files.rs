@@ -4,7 +4,8 @@ use std::{
     collections::HashSet,
     fs,
     path::{Path, PathBuf},
-    process,
+    process, thread,
+    time::{Duration, Instant},
 };
 
 use crate::failure::Failure;
@@ -47,6 +48,10 @@ impl ReportFolder {
 
     pub(crate) fn html(&self) -> PathBuf {
         self.path.join(HTML)
+    }
+
+    pub(crate) fn json(&self) -> PathBuf {
+        self.path.join(JSON)
     }
 
     /// Writes both files, the machine's first: it marks the folder as ours.
@@ -179,28 +184,52 @@ pub(crate) fn file_url(path: &Path) -> String {
     url
 }
 
-/// Shows a file with the program the system has for it.
+/// How systems open a file in the program for it, the usual one first: program and first arguments.
+#[cfg(target_os = "macos")]
+const OPENERS: [(&str, &[&str]); 1] = [("open", &[])];
+#[cfg(windows)]
+const OPENERS: [(&str, &[&str]); 1] = [("cmd", &["/C", "start", ""])];
+#[cfg(not(any(target_os = "macos", windows)))]
+const OPENERS: [(&str, &[&str]); 4] =
+    [("xdg-open", &[]), ("gio", &["open"]), ("wslview", &[]), ("sensible-browser", &[])];
+
+/// A program that has not complained for so long has shown the file.
+const OPENS_WITHIN: Duration = Duration::from_secs(2);
+
+/// Shows a file with the first program of the system that does. Errors: none does; the hint says what to open by hand.
 pub(crate) fn open(path: &Path) -> Result<(), Failure> {
-    let (program, first): (&str, &[&str]) = if cfg!(target_os = "macos") {
-        ("open", &[])
-    } else if cfg!(windows) {
-        ("cmd", &["/C", "start", ""])
-    } else {
-        ("xdg-open", &[])
-    };
-    process::Command::new(program)
-        .args(first)
-        .arg(path)
-        .stdin(process::Stdio::null())
-        .stdout(process::Stdio::null())
-        .stderr(process::Stdio::null())
-        .spawn()
-        .map(|_| ())
-        .map_err(|e| {
-            Failure::from(e)
-                .within(format!("cannot start `{program}` to open {}", path.display()))
-                .hint(format!("open {} in a browser", file_url(path)))
-        })
+    let mut tried = Vec::new();
+    for (program, first) in OPENERS {
+        let started = process::Command::new(program)
+            .args(first)
+            .arg(path)
+            .stdin(process::Stdio::null())
+            .stdout(process::Stdio::null())
+            .stderr(process::Stdio::null())
+            .spawn();
+        match started {
+            Ok(child) => match shows(child) {
+                true => return Ok(()),
+                false => tried.push(format!("`{program}` failed")),
+            },
+            Err(e) => tried.push(format!("`{program}`: {e}")),
+        }
+    }
+    let message = format!("no program opens {} ({})", path.display(), tried.join("; "));
+    Err(Failure::new(message).hint(format!("open {} in a browser", file_url(path))))
+}
+
+/// False where the program ends at once and says that it failed. Some stay as long as the window they open.
+fn shows(mut child: process::Child) -> bool {
+    let start = Instant::now();
+    while start.elapsed() < OPENS_WITHIN {
+        match child.try_wait() {
+            Ok(Some(status)) => return status.success(),
+            Ok(None) => thread::sleep(Duration::from_millis(20)),
+            Err(_) => return true,
+        }
+    }
+    true
 }
 
 #[cfg(test)]

@@ -88,6 +88,12 @@ impl Terminal {
         self.result(&text)
     }
 
+    /// Characters in a line of stdout; where it is no terminal, tables may be as wide as they are.
+    pub(crate) fn width(&self) -> usize {
+        const NO_BOUND: usize = 1000;
+        console::Term::stdout().size_checked().map_or(NO_BOUND, |(_, columns)| usize::from(columns))
+    }
+
     /// A word in a result, coloured where stdout takes colour.
     pub(crate) fn paint(&self, tone: Tone, word: &str) -> String {
         paint(self.color_stdout, tone, word)

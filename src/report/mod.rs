@@ -2,7 +2,7 @@
 //!
 //! An [`Audit`](crate::audit::Audit) leaves in three forms that say the same. [`wire`] is the versioned form for
 //! programs, written by [`to_json`]; [`summary`] is what a person reads in ten seconds on a terminal, as lines of
-//! [`Span`]s with a [`Tone`] each; [`page`] is one HTML file with the verdicts first and the evidence behind them,
+//! [`Span`]s with a [`Tone`] each ([`overview`]: several recordings beside each other); [`page`] is one HTML file with the verdicts first and the evidence behind them,
 //! with the recording's [`Pictures`]: photos ([`Photo`]) with what the detector saw in them ([`Overlay`]), and a few
 //! frames with their depth ([`Closeup`]) to lay over each other and to turn in space.
 //! [`sheet_pdf`], [`sheet_svg`] and [`sheet_png`] are the printed target.
@@ -11,10 +11,10 @@
 //! Nothing here judges: words, numbers and verdicts come from [`diagnose`](crate::diagnose).
 //!
 //! ```
-//! use truedepth::report::Tone;
+//! use truedepth::report::{Tone, Typed, summary};
 //!
 //! # fn show(audit: &truedepth::audit::Audit) {
-//! for line in truedepth::report::summary(audit) {
+//! for line in summary(audit, &Typed::of(audit), 100) {
 //!     for span in line.spans {
 //!         print!("{}", if span.tone == Tone::Bad { span.text.to_uppercase() } else { span.text });
 //!     }
@@ -34,6 +34,7 @@ mod frames;
 mod html;
 mod json;
 mod lens_pictures;
+mod next;
 mod overlay;
 mod photo;
 mod pictures;
@@ -53,8 +54,9 @@ pub use figures::FIGURES;
 pub use html::page;
 pub use json::to_json;
 pub use lens_pictures::{LensDrawn, LensFrame, LensPictures, state_in_words};
+pub use next::Typed;
 pub use overlay::Overlay;
 pub use photo::{Photo, PhotoSize};
 pub use pictures::{Closeup, Pictures};
 pub use sheet::{sheet_image, sheet_pdf, sheet_png, sheet_svg};
-pub use text::{Line, Span, Tone, summary};
+pub use text::{Line, Overview, Span, Tone, overview, summary};

@@ -8,11 +8,11 @@ use crate::{
     audit::{Audit, FrameAudit, Method},
     board::{CharucoBoard, Layout},
     calibrate::{
-        self, Calibration, Candidate, DistortionTest, Estimate, Hypothesis, Lens, Model, Outlier,
-        Parameter, RejectedFrame, Rejection,
+        self, BoardSurface, Calibration, Candidate, DistortionTest, Estimate, FrameCorners,
+        Hypothesis, Lens, Model, Outlier, Parameter, RejectedFrame, Rejection, SurfaceKind,
     },
     camera::{Camera, Distortion, Intrinsics},
-    depth::against_board,
+    depth::{Holes, Pattern, PatternCell, Registration, against_board, patches},
     detect::{Corner, Identity, Observation, Reason, Reject},
     diagnose::{
         Code, Correction, Device, DistortionState, Evidence, Finding, Sensor, Unit, Verdict,
@@ -67,6 +67,68 @@ pub(super) fn audit() -> Audit {
         frames,
         board,
     }
+}
+
+/// As [`audit`], with all that an audit can have: the board's shape, the motion of the poses, depth over the whole board.
+pub(super) fn rich_audit() -> Audit {
+    let mut audit = audit();
+    let board = audit.board.clone();
+    let input_frames: Vec<FrameCorners> = audit
+        .frames
+        .iter()
+        .enumerate()
+        .map(|(frame, f)| FrameCorners { frame, corners: f.observation.corners.clone() })
+        .collect();
+    let factory = intrinsics(FACTORY_FOCAL_PX);
+    let input =
+        calibrate::Input { board: &board, factory: &factory, tables: None, frames: &input_frames };
+    let model = calibrate::Method::Robust(Model::FocalCentre);
+    let motion = calibrate::calibrate(&input, model).expect("the sample is good enough").motion;
+    for (index, frame) in audit.frames.iter_mut().enumerate() {
+        let depth_m = 0.24 + 0.015 * index as f32;
+        let map = DepthMap::new(640, 480, vec![depth_m; 640 * 480]);
+        frame.patches = patches(&map, &board, &frame.observation.corners);
+    }
+    let calibration = audit.calibration.as_mut().expect("the sample has one");
+    calibration.motion = motion;
+    let heights_m = (0..board.n_corners()).map(|id| 4e-4 * wobble(id)).collect();
+    calibration.surface = Some(BoardSurface {
+        kind: SurfaceKind::Free,
+        heights_m,
+        sigmas_m: vec![2e-5; board.n_corners()],
+        print: None,
+    });
+    let estimate = |value, sigma| Estimate { value, sigma };
+    let cells = (0..16 * 12)
+        .map(|cell| PatternCell {
+            median_m: if cell < 8 { f64::NAN } else { 5e-4 * wobble(cell) },
+            n_frames: 5,
+            n_patches: 40,
+        })
+        .collect();
+    let pattern = Pattern {
+        cell_px: 40,
+        columns: 16,
+        cells,
+        pixel_noise_m: 3e-4,
+        frame_noise_m: 2e-4,
+        fixed_m: 3e-4,
+        holes: Holes::default(),
+    };
+    audit.registration = Some(Registration {
+        scale: estimate(1.003, 0.009),
+        bias_m: estimate(-5e-4, 1e-3),
+        zoom: estimate(0.9507, 0.001),
+        shift_px: [estimate(0.2, 0.3), estimate(-0.1, 0.3)],
+        covariance: [[0.0; 5]; 5],
+        center_m: 0.3,
+        range_m: [0.2, 0.4],
+        n_frames: 3,
+        frames: vec![0, 1, 4],
+        n_patches: 1200,
+        pattern,
+    });
+    audit
 }
 
 /// A recording of one frame with the metadata of [`audit`].

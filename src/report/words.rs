@@ -21,9 +21,37 @@ pub(super) struct Row {
 /// What stands above the first four columns.
 pub(super) const HEADER: [&str; 4] = ["", "factory", "measured", "difference"];
 
-/// The table of quantities: one row for each check, and the error of the depth beside them.
+/// Checks of a quantity: they have a row of the table whatever their verdict.
+const QUANTITIES: [Code; 9] = [
+    Code::TD201,
+    Code::TD202,
+    Code::TD203,
+    Code::TD301,
+    Code::TD302,
+    Code::TD303,
+    Code::TD401,
+    Code::TD402,
+    Code::TD403,
+];
+
+/// True where the finding says something that the table of quantities must show.
+fn has_a_row(finding: &Finding) -> bool {
+    QUANTITIES.contains(&finding.code) || !matches!(finding.verdict, Verdict::Ok | Verdict::Info)
+}
+
+/// The checks without a row: nothing is wrong and there is no quantity to show. Those that are worth knowing, and those
+/// that are merely OK.
+pub(super) fn without_a_row(audit: &Audit) -> [Vec<&Finding>; 2] {
+    [Verdict::Info, Verdict::Ok].map(|verdict| {
+        audit.findings.iter().filter(|f| f.verdict == verdict && !has_a_row(f)).collect()
+    })
+}
+
+/// The table of quantities: one row for each, and the error of the depth beside them; further rows for whatever else
+/// is not in order.
 pub(super) fn rows(audit: &Audit) -> Vec<Row> {
-    let mut rows: Vec<Row> = audit.findings.iter().map(|finding| row(audit, finding)).collect();
+    let findings = audit.findings.iter().filter(|finding| has_a_row(finding));
+    let mut rows: Vec<Row> = findings.map(|finding| row(audit, finding)).collect();
     let error = |depth: Option<&crate::depth::BoardDepth>| {
         let estimate = depth.and_then(|depth| depth.mean_of_medians_m);
         estimate.map_or("—".to_owned(), |e| format!("{} mm", signed_with_sigma(in_mm(e), 2)))
@@ -49,11 +77,26 @@ fn row(audit: &Audit, finding: &Finding) -> Row {
     let factory = audit.factory.as_ref().map(|factory| &factory.intrinsics);
     let judged =
         finding.value.map(|value| Estimate { value, sigma: finding.sigma.unwrap_or(f64::NAN) });
+    let named = |name: &str| {
+        let found = finding.evidence.iter().find(|evidence| evidence.name == name)?;
+        Some(Estimate { value: found.value, sigma: found.sigma.unwrap_or(f64::NAN) })
+    };
+    let mut difference = difference(finding);
     let (factory, measured) = match finding.code {
         Code::TD201 => (
             factory.map_or_else(dash, |f| format!("{} px", plain(f.focal_px(), 2))),
             focal(audit).map_or_else(dash, |focal| format!("{} px", value_and_sigma(focal, 2))),
         ),
+        Code::TD202 => {
+            let both = named("center_x_px").zip(named("center_y_px"));
+            let pair = |(x, y): (Estimate, Estimate)| {
+                format!("{}, {} px", plain(x.value, 2), plain(y.value, 2))
+            };
+            (
+                factory.map_or_else(dash, |f| format!("{}, {} px", plain(f.cx, 2), plain(f.cy, 2))),
+                both.map_or_else(dash, pair),
+            )
+        }
         Code::TD203 => (dash(), audit.distortion_state.name().replace('_', " ")),
         // The deviation that was judged (a slope or a mean ratio), so that both columns tell the same.
         Code::TD301 => {
@@ -63,18 +106,25 @@ fn row(audit: &Audit, finding: &Finding) -> Row {
             "0 mm".to_owned(),
             judged.map_or_else(dash, |d| format!("{} mm", value_and_sigma(d, 2))),
         ),
+        Code::TD303 => {
+            let noise = named("pixel_noise_mm").map(|e| format!("{} mm", plain(e.value, 2)));
+            if judged.is_some() {
+                let percent = judged.map_or(f64::NAN, |share| share.value);
+                difference = format!("{} % holes", plain(percent, 2));
+            }
+            (String::new(), noise.map_or_else(dash, |noise| format!("{noise} noise")))
+        }
         Code::TD401 => {
             ("1".to_owned(), judged.map_or_else(dash, |d| value_and_sigma(as_scale(d), 4)))
         }
         Code::TD402 => {
-            let axis = |name: &str| {
-                let found = finding.evidence.iter().find(|evidence| evidence.name == name)?;
-                let sigma = found.sigma.unwrap_or(f64::NAN);
-                Some(signed_with_sigma(Estimate { value: found.value, sigma }, 2))
+            let both = named("shift_x_px").zip(named("shift_y_px"));
+            // With the σ of the difference in the next column; that of each axis stands in the evidence.
+            let pair = |(x, y): (Estimate, Estimate)| {
+                let decimals = if x.sigma.max(y.sigma) < 0.95 { 2 } else { 1 };
+                format!("{}, {} px", signed(x.value, decimals), signed(y.value, decimals))
             };
-            let both = axis("shift_x_px").zip(axis("shift_y_px"));
-            let zero = "0, 0 px".to_owned();
-            (zero, both.map_or_else(dash, |(x, y)| format!("{x}, {y} px")))
+            ("0, 0 px".to_owned(), both.map_or_else(dash, pair))
         }
         Code::TD403 => {
             let answer = |n: f64| {
@@ -88,7 +138,7 @@ fn row(audit: &Audit, finding: &Finding) -> Row {
         quantity: finding.title().to_owned(),
         factory,
         measured,
-        difference: difference(finding),
+        difference,
         verdict: Some((finding.code, finding.verdict)),
     }
 }
@@ -197,24 +247,81 @@ pub(super) fn board_line(audit: &Audit) -> String {
 /// The outcome in one sentence.
 pub(super) fn headline(audit: &Audit) -> (Verdict, String) {
     let number = |verdict| audit.findings.iter().filter(|f| f.verdict == verdict).count();
-    match (number(Verdict::Fault), number(Verdict::Unknown)) {
-        (0, 0) if audit.findings.is_empty() => {
-            (Verdict::Unknown, "Nothing could be checked.".to_owned())
+    let titles = |verdict| {
+        let of_verdict = audit.findings.iter().filter(|f| f.verdict == verdict);
+        of_verdict.map(|f| f.title().to_lowercase()).collect::<Vec<_>>().join(", ")
+    };
+    let [faults, warnings, unknown] =
+        [Verdict::Fault, Verdict::Warning, Verdict::Unknown].map(number);
+    let all = audit.findings.len();
+    if all == 0 {
+        return (Verdict::Unknown, "Nothing could be checked.".to_owned());
+    }
+    if faults > 0 {
+        let titles = titles(Verdict::Fault);
+        return (
+            Verdict::Fault,
+            format!("This recording has {}: {titles}.", count(faults, "fault")),
+        );
+    }
+    let but = match (warnings, unknown) {
+        (0, 0) => return (Verdict::Ok, "This recording shows no fault.".to_owned()),
+        (0, 1) => format!("1 check cannot tell: {}.", titles(Verdict::Unknown)),
+        (0, unknown) => format!("{unknown} of {all} checks cannot tell."),
+        (warnings, _) => {
+            format!("{}: {}.", count(warnings, "warning"), titles(Verdict::Warning))
         }
-        (0, 0) => (Verdict::Ok, "This recording shows no fault.".to_owned()),
-        (0, unknown) => {
-            let verb = if unknown == 1 { "check cannot" } else { "checks cannot" };
-            (Verdict::Unknown, format!("No fault seen, but {unknown} {verb} tell."))
-        }
-        (faults, _) => {
-            let titles = by_severity(audit)
-                .into_iter()
-                .take(faults)
-                .map(|finding| finding.title().to_lowercase());
-            let titles = titles.collect::<Vec<_>>().join(", ");
-            (Verdict::Fault, format!("This recording has {}: {titles}.", count(faults, "fault")))
+    };
+    let verdict = if warnings > 0 { Verdict::Warning } else { Verdict::Unknown };
+    (verdict, format!("No fault seen, but {but}"))
+}
+
+/// Checks that cannot tell, for one reason or with one remedy.
+pub(super) struct CannotTell<'a> {
+    /// By code.
+    pub(super) findings: Vec<&'a Finding>,
+    /// Why, where it is one reason for all that stands in none of their own words.
+    pub(super) why: Option<String>,
+    /// What to record.
+    pub(super) what_to_do: &'a str,
+}
+
+/// What cannot be told, grouped: first all that waits for the camera where there is none, then by what to record.
+pub(super) fn cannot_tell(audit: &Audit) -> Vec<CannotTell<'_>> {
+    const NEED_THE_CAMERA: [Code; 9] = [
+        Code::TD201,
+        Code::TD202,
+        Code::TD203,
+        Code::TD204,
+        Code::TD301,
+        Code::TD302,
+        Code::TD303,
+        Code::TD401,
+        Code::TD402,
+    ];
+    let mut groups: Vec<CannotTell<'_>> = Vec::new();
+    for finding in audit.findings.iter().filter(|f| f.verdict == Verdict::Unknown) {
+        let waits = finding.value.is_none() && NEED_THE_CAMERA.contains(&finding.code);
+        let why = audit.no_calibration.as_ref().filter(|_| waits && audit.camera.is_none());
+        let same = groups.iter_mut().find(|group| match why {
+            Some(_) => group.why.is_some(),
+            None => group.why.is_none() && group.what_to_do == finding.what_to_do,
+        });
+        match same {
+            Some(group) => group.findings.push(finding),
+            None => groups.push(CannotTell {
+                findings: vec![finding],
+                why: why.map(|why| format!("{}.", capitalised(why))),
+                what_to_do: &finding.what_to_do,
+            }),
         }
     }
+    groups
+}
+
+fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
 }
 
 /// Faults first, each group by code.
@@ -235,22 +342,12 @@ pub(super) const fn verdict_word(verdict: Verdict) -> &'static str {
     }
 }
 
-/// What to type to read more.
-pub(super) fn explain_command(finding: &Finding) -> String {
-    format!("truedepth explain {}", finding.code)
-}
-
-/// What to type next, and what for.
-pub(super) fn next_commands(_audit: &Audit, finding: &Finding) -> Vec<(String, &'static str)> {
-    vec![(explain_command(finding), "Read more")]
-}
-
 /// A summary without the test that it ends with in parentheses, and the test.
 pub(super) fn sentence_and_test(summary: &str) -> (String, Option<String>) {
     let parts = summary.strip_suffix(").").and_then(|rest| rest.rsplit_once(" ("));
     match parts {
         Some((sentence, test)) if !test.contains(')') => {
-            (format!("{sentence}."), Some(format!("{test}.")))
+            (format!("{sentence}."), Some(format!("{}.", capitalised(test))))
         }
         _ => (summary.to_owned(), None),
     }
@@ -275,7 +372,11 @@ pub(super) fn how_sure(finding: &Finding) -> Option<String> {
 
 /// The frames that a check rests on; `None` where it rests on metadata alone or on none.
 pub(super) fn frames_behind(audit: &Audit, code: Code) -> Option<Vec<usize>> {
-    let depth = || {
+    // Those of the board's whole surface; without them, those with depth at the corners.
+    let registered = || {
+        if let Some(registration) = &audit.registration {
+            return Some(registration.frames.clone());
+        }
         let depth = audit.own_depth.as_ref().or(audit.factory_depth.as_ref())?;
         let used = depth.frames.iter().filter(|frame| frame.median_error_m.is_some());
         Some(used.map(|frame| frame.frame).collect())
@@ -286,8 +387,8 @@ pub(super) fn frames_behind(audit: &Audit, code: Code) -> Option<Vec<usize>> {
         Some((0..audit.frames.len()).filter(is_seen).collect())
     };
     let frames: Vec<usize> = match code {
-        Code::TD201 | Code::TD203 => views(),
-        Code::TD301 | Code::TD302 => depth(),
+        Code::TD201 | Code::TD202 | Code::TD203 | Code::TD204 => views(),
+        Code::TD301 | Code::TD302 | Code::TD303 | Code::TD401 | Code::TD402 => registered(),
         Code::TD403 => seen(),
         _ => None,
     }?;
@@ -445,7 +546,7 @@ mod tests {
     fn what_speaks_for_a_verdict() {
         let (sentence, test) = sentence_and_test("It is 3 (not 4) long (by a ruler; tolerance 1).");
         assert_eq!(sentence, "It is 3 (not 4) long.");
-        assert_eq!(test.as_deref(), Some("by a ruler; tolerance 1."));
+        assert_eq!(test.as_deref(), Some("By a ruler; tolerance 1."));
         assert_eq!(sentence_and_test("No test."), ("No test.".to_owned(), None));
         assert_eq!(sentence_and_test("(a) (b))."), ("(a) (b)).".to_owned(), None));
         assert_eq!(ranges(&[0, 1, 2, 5, 7, 8]), "0–2, 5, 7–8");

@@ -8,7 +8,7 @@ use std::{
 use truedepth::{
     audit::{Audit, Method, Options, Progress, audit_observed},
     recording::{Found, Recording},
-    report::{self, Pictures, wire},
+    report::{self, Overview, Pictures, Typed, wire},
 };
 
 use crate::{
@@ -26,7 +26,11 @@ pub(crate) fn run(args: &AuditArgs, terminal: &Terminal) -> Result<Outcome, Fail
     let mut found = Vec::new();
     for path in &args.recordings {
         match input::recordings(path, &args.input) {
-            Ok(inside) => found.extend(inside),
+            Ok(inside) => {
+                // The only one of a folder or archive is opened by what was typed; another by where it is in there.
+                let typed = (inside.len() == 1).then(|| path.display().to_string());
+                found.extend(inside.into_iter().map(|found| (typed.clone(), found)));
+            }
             Err(failure) if args.recordings.len() == 1 => return Err(failure),
             Err(failure) => {
                 terminal.failure(&failure);
@@ -36,19 +40,28 @@ pub(crate) fn run(args: &AuditArgs, terminal: &Terminal) -> Result<Outcome, Fail
     }
     let alone = args.recordings.len() == 1 && found.len() == 1;
     let mut taken = BTreeSet::new();
-    for (index, found) in found.into_iter().enumerate() {
+    let mut beside = Vec::new();
+    for (index, (typed, found)) in found.into_iter().enumerate() {
         if index > 0 && !args.json {
             terminal.result("\n")?;
         }
         let folder = report_folder(args, &found.name, alone, &mut taken);
-        match one(found, &options, folder.as_deref(), args, terminal) {
-            Ok(outcome) => worst = worst.max(outcome),
+        let typed = typed.unwrap_or_else(|| found.place());
+        match one((found, typed), &options, folder.as_deref(), args, terminal) {
+            Ok((outcome, overview)) => {
+                worst = worst.max(outcome);
+                beside.push(overview);
+            }
             Err(failure) if alone => return Err(failure),
             Err(failure) => {
                 terminal.failure(&failure);
                 worst = Outcome::NotAllRan;
             }
         }
+    }
+    if !args.json && beside.len() > 1 {
+        terminal.result("\n")?;
+        terminal.lines(&report::overview(&beside, terminal.width()))?;
     }
     Ok(worst)
 }
@@ -103,33 +116,36 @@ fn report_folder(
 
 /// Audits one recording: the result to stdout, the report into its folder.
 fn one(
-    found: Found,
+    (found, recording_typed): (Found, String),
     options: &Options,
     folder: Option<&Path>,
     args: &AuditArgs,
     terminal: &Terminal,
-) -> Result<Outcome, Failure> {
+) -> Result<(Outcome, Overview), Failure> {
     // A folder that must not be written is better known before the work than after.
     let folder = folder.map(ReportFolder::new).transpose()?;
     let recording = found.open()?;
     terminal.detail(&format!("{}: {} frames", recording.place(), recording.frames.len()));
     let audit = observed(&recording, options, terminal)?;
     let json = report::to_json(&wire::Document::Audit(Box::new(wire::Audit::from(&audit))));
+    let report = folder.as_ref().map(|folder| folder.json().display().to_string());
+    let typed = Typed { recording: recording_typed, report };
     if let Some(folder) = &folder {
-        folder.write(&json, &page(&recording, &audit)?)?;
+        folder.write(&json, &page(&recording, &audit, &typed)?)?;
     }
     if args.json {
         terminal.result(&json)?;
     } else {
-        terminal.lines(&report::summary(&audit))?;
+        terminal.lines(&report::summary(&audit, &typed, terminal.width()))?;
     }
     if let Some(folder) = folder {
         terminal.say(&format!("report: {}", folder.html().display()));
         if args.open {
-            files::open(&folder.html())?;
+            show(&folder, terminal);
         }
     }
-    Ok(if audit.has_faults() { Outcome::Faults } else { Outcome::Clean })
+    let outcome = if audit.has_faults() { Outcome::Faults } else { Outcome::Clean };
+    Ok((outcome, Overview::of(&audit, &typed)))
 }
 
 /// The audit, with a progress bar.
@@ -149,6 +165,13 @@ pub(crate) fn observed(
 }
 
 /// The report as a page, with the recording's images.
-pub(crate) fn page(recording: &Recording, audit: &Audit) -> Result<String, Failure> {
-    Ok(report::page(audit, &Pictures::read(recording, audit)?))
+pub(crate) fn page(recording: &Recording, audit: &Audit, typed: &Typed) -> Result<String, Failure> {
+    Ok(report::page(audit, &Pictures::read(recording, audit)?, typed))
+}
+
+/// Opens the report. Where no program does, that is said, and how to open it; the audit itself has run.
+pub(crate) fn show(folder: &ReportFolder, terminal: &Terminal) {
+    if let Err(failure) = files::open(&folder.html()) {
+        terminal.failure(&failure);
+    }
 }

@@ -5,21 +5,23 @@ use std::sync::Arc;
 use truedepth::{
     audit::{Method, Options},
     recording::{Limits, Memory, Recording},
-    report::{self, Tone, wire},
+    report::{self, Tone, Typed, wire},
     simulate::{Device, Fault, Faults, Plan, Truth},
 };
 
-use super::audit::{observed, page};
+use super::audit::{observed, page, show};
 use crate::{
     args::DemoArgs,
     failure::Failure,
-    files::{self, ReportFolder, file_url, write_atomically},
+    files::{ReportFolder, file_url, write_atomically},
     outcome::Outcome,
     terminal::Terminal,
 };
 
 /// The tablet of the paper's issue 2 (arXiv:2201.10865), as bad as it was measured there.
 const DEVICE: &str = "ipad-12.9-5gen";
+/// What the recording is called in the commands that are shown.
+const RECORDING: &str = "ipad";
 const FAULTS: [Fault; 2] = [Fault::Focal { excess: 0.066 }, Fault::DepthScale { excess: 0.015 }];
 
 pub(crate) fn run(args: &DemoArgs, terminal: &Terminal) -> Result<Outcome, Failure> {
@@ -45,27 +47,31 @@ pub(crate) fn run(args: &DemoArgs, terminal: &Terminal) -> Result<Outcome, Failu
     let found = wire::Audit::from(&audit);
     let document = wire::Document::Audit(Box::new(found.clone()));
     let json = report::to_json(&document);
-    folder.write(&json, &page(&recording, &audit)?)?;
+    let typed = Typed {
+        recording: RECORDING.to_owned(),
+        report: Some(folder.json().display().to_string()),
+    };
+    folder.write(&json, &page(&recording, &audit, &typed)?)?;
     let truth = plan.truth();
     write_atomically(&args.output.join("truth.json"), truth.to_json().as_bytes())?;
 
     if args.json.json {
         terminal.result(&json)?;
     } else {
-        terminal.lines(&report::summary(&audit))?;
+        terminal.lines(&report::summary(&audit, &typed, terminal.width()))?;
         terminal.result(&beside(&truth, &found, terminal))?;
     }
     let flags: Vec<String> = faults.iter().map(|fault| format!("--fault {fault}")).collect();
     terminal.say(&format!("\nthe report:    {}", file_url(&folder.html())));
     terminal.say(&format!(
-        "the recording: truedepth simulate --device {DEVICE} {} --frames {} --seed {} -o ipad",
+        "the recording: truedepth simulate --device {DEVICE} {} --frames {} --seed {} -o {RECORDING}",
         flags.join(" "),
         plan.n_frames,
         plan.seed
     ));
     terminal.say("your own:      truedepth audit REC");
     if args.open {
-        files::open(&folder.html())?;
+        show(&folder, terminal);
     }
     Ok(if audit.has_faults() { Outcome::Faults } else { Outcome::Clean })
 }

@@ -103,7 +103,7 @@ fn space_by_keyboard(browser: &Browser) {
 
 fn sliders(browser: &Browser, pointer: Pointer) {
     for figure in ["over", "edges"] {
-        let slider = format!("#{figure} input");
+        let slider = format!("#{figure} input[type=range]");
         let cut = || {
             browser.script(&format!(
                 "return document.querySelector('#{figure} .stage').style.getPropertyValue('--cut')"
@@ -125,6 +125,51 @@ fn sliders(browser: &Browser, pointer: Pointer) {
             assert!(value(browser, &slider) > before, "by keyboard");
         }
     }
+}
+
+/// The error of every pixel instead of its depth, before and after the correction.
+fn distances(browser: &Browser, pointer: Pointer) {
+    let depth = pixels(browser, "#over canvas");
+    browser.click(pointer, "#over input[value=distance]");
+    let shown = "return [...document.querySelectorAll('#over .scale-of-colours')].map((e) => e.checkVisibility()).join()";
+    assert_eq!(browser.script(shown), "false,true");
+    let before = pixels(browser, "#over canvas");
+    assert_ne!(before, depth);
+    let other = "#space-state input:not(:checked)";
+    browser.click(pointer, other);
+    assert_ne!(pixels(browser, "#over canvas"), before, "the correction changes distances");
+    browser.click(pointer, other);
+    assert_eq!(pixels(browser, "#over canvas"), before);
+    browser.click(pointer, "#over input[value=depth]");
+    assert_eq!(browser.script(shown), "true,false");
+}
+
+/// Each command that is shown is on the clipboard after one press.
+fn copies(browser: &Browser) {
+    let last = "const all = document.querySelectorAll('.next .copy'); return all[all.length - 1].dataset.copy";
+    let command = browser.script(last);
+    browser.click(Pointer::Mouse, ".next dd:last-of-type .copy");
+    browser.wait_for(
+        "[...document.querySelectorAll('.next .copy')].some((b) => b.textContent === 'Copied')",
+    );
+    assert!(command.as_str().expect("a command").starts_with("truedepth audit "), "{command}");
+}
+
+/// What has the focus can be seen to have it.
+fn focus_is_visible(browser: &Browser) {
+    browser.script("document.activeElement.blur(); scrollTo(0, 0)");
+    let mut seen = std::collections::BTreeSet::new();
+    for _ in 0..40 {
+        browser.keys(&[TAB]);
+        let focused = browser.script(
+            "const e = document.activeElement; const s = getComputedStyle(e);
+             return [s.outlineStyle !== 'none' && parseFloat(s.outlineWidth) >= 2, e.tagName + ' ' + e.className].join('|')",
+        );
+        let focused = focused.as_str().expect("a text").to_owned();
+        assert!(focused.starts_with("true|"), "nobody sees the focus on {focused}");
+        seen.insert(focused);
+    }
+    assert!(seen.len() > 5, "Tab leads through the page: {seen:?}");
 }
 
 fn gallery(browser: &Browser, pointer: Pointer) {
@@ -212,11 +257,14 @@ fn mouse_touch_and_keyboard() {
         }
         space(&browser, pointer);
         sliders(&browser, pointer);
+        distances(&browser, pointer);
         gallery(&browser, pointer);
         if pointer == Pointer::Mouse {
             space_by_keyboard(&browser);
             hovering(&browser);
             the_rest(&browser);
+            copies(&browser);
+            focus_is_visible(&browser);
         }
         assert_eq!(browser.console(), [""; 0]);
     }

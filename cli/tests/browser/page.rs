@@ -2,25 +2,16 @@
 
 use std::path::Path;
 
+use truedepth::report::FIGURES;
+
 use crate::{
     browser,
     driver::{Browser, Pointer},
     folder, real_recordings, simulated_report, truedepth,
 };
 
-/// Figures that a report of a recording with factory metadata, board and depth has.
-const FIGURES: [&str; 10] = [
-    "depth-factory",
-    "depth-own",
-    "depth-error",
-    "depth-frames",
-    "depth-range",
-    "focal",
-    "lens",
-    "models",
-    "residuals",
-    "views",
-];
+/// A simulated board is flat: there is no shape to show.
+const NOT_SIMULATED: [&str; 1] = ["board-shape"];
 /// Device and colour scheme.
 const EVERY_WAY: [[&str; 2]; 4] =
     [["phone", "light"], ["phone", "dark"], ["desk", "light"], ["desk", "dark"]];
@@ -36,8 +27,13 @@ fn assert_quiet(browser: &Browser) {
 }
 
 /// Each figure has marks inside its drawing, words below it, and rows in its table.
-fn assert_figures(browser: &Browser) {
-    for id in FIGURES {
+fn assert_figures(browser: &Browser, absent: &[&str]) {
+    let shown = browser.script(
+        "return [...document.querySelectorAll('.evidence .figure')].map((f) => f.id).join(' ')",
+    );
+    let expected: Vec<&str> = FIGURES.into_iter().filter(|id| !absent.contains(id)).collect();
+    assert_eq!(shown, expected.join(" "));
+    for id in expected {
         let number = |what: &str| {
             let counted = browser.script(&format!(
                 "const f = document.getElementById({id:?}); return f ? f.querySelectorAll({what:?}).length : -1;"
@@ -105,8 +101,57 @@ fn assert_contrast(browser: &Browser, scheme: &str) {
     assert_eq!(faint, "", "too faint in {scheme}");
 }
 
+/// What a screen reader and a keyboard need: names for all that is looked at or pressed, headings in order, references
+/// that lead somewhere, and meaning that does not hang on colour alone.
+fn assert_accessible(browser: &Browser) {
+    let wrong = browser.script(
+        r"
+        const wrong = [];
+        const name = (e) => (e.getAttribute('aria-label') ?? '').trim() || e.textContent.trim() ||
+          (e.getAttribute('aria-labelledby') ?? '').split(' ').map((id) => document.getElementById(id)?.textContent ?? '')
+            .join(' ').trim();
+        const show = (e) => `${e.tagName} ${e.id} ${e.outerHTML.slice(0, 90)}`;
+        for (const e of document.querySelectorAll('img')) if (!e.alt.trim()) wrong.push('no alt: ' + show(e));
+        for (const e of document.querySelectorAll('[role=img]')) {
+          const labelled = e.getAttribute('aria-labelledby');
+          const words = labelled ? document.getElementById(labelled)?.textContent : e.getAttribute('aria-label');
+          if (!words?.trim()) wrong.push('no name: ' + show(e));
+        }
+        for (const e of document.querySelectorAll('button, a, summary')) if (!name(e)) wrong.push('no name: ' + show(e));
+        for (const e of document.querySelectorAll('input')) {
+          if (!(e.labels.length > 0 && e.labels[0].textContent.trim()) && !e.getAttribute('aria-label')) {
+            wrong.push('no label: ' + show(e));
+          }
+        }
+        for (const attribute of ['aria-labelledby', 'aria-describedby']) {
+          for (const e of document.querySelectorAll(`[${attribute}]`)) {
+            for (const id of e.getAttribute(attribute).split(' ')) {
+              if (!document.getElementById(id)) wrong.push(`${attribute}=${id} leads nowhere`);
+            }
+          }
+        }
+        let level = 0;
+        for (const e of document.querySelectorAll('h1, h2, h3, h4')) {
+          const own = Number(e.tagName[1]);
+          if (own > level + 1) wrong.push('a heading is skipped before ' + show(e));
+          level = own;
+        }
+        for (const e of document.querySelectorAll('.chip')) if (!e.textContent.trim()) wrong.push('colour only: ' + show(e));
+        // Far from zero a cell says so by its sign or its number.
+        for (const figure of document.querySelectorAll('.figure:has(.heat)')) {
+          const strong = figure.querySelectorAll(':is(.p2, .p3, .p4, .m2, .m3, .m4).mark').length;
+          const said = figure.querySelectorAll('.heat :is(.sign, .in-cell)').length;
+          if (said < strong) wrong.push(`colour only: ${figure.id} says ${said} of ${strong}`);
+        }
+        if (document.querySelectorAll('h1').length !== 1) wrong.push('not one h1');
+        return wrong.join('\n');
+    ",
+    );
+    assert_eq!(wrong, "");
+}
+
 /// At phone and desktop width, light and dark, and on paper.
-fn look(browser: &Browser, page: &Path, name: &str, schemes: &[[&str; 2]]) {
+fn look(browser: &Browser, page: &Path, name: &str, schemes: &[[&str; 2]], absent: &[&str]) {
     for [device, scheme] in schemes {
         browser.media(scheme, "screen");
         let (width, height, pointer) = match *device {
@@ -117,8 +162,9 @@ fn look(browser: &Browser, page: &Path, name: &str, schemes: &[[&str; 2]]) {
         browser.open(page);
         browser.wait_for("document.querySelector('#space-view')?.dataset.points > 0");
         assert_fits(browser);
-        assert_figures(browser);
+        assert_figures(browser, absent);
         assert_contrast(browser, scheme);
+        assert_accessible(browser);
         assert_quiet(browser);
         browser.screenshot(&folder().join(format!("{name}-{device}-{scheme}.png")));
     }
@@ -131,7 +177,7 @@ fn look(browser: &Browser, page: &Path, name: &str, schemes: &[[&str; 2]]) {
 fn simulated() {
     let Some(browser) = browser() else { return };
     let page = simulated_report("page");
-    look(&browser, &page, "simulated", &EVERY_WAY);
+    look(&browser, &page, "simulated", &EVERY_WAY, &NOT_SIMULATED);
     let bytes = std::fs::metadata(&page).expect("it was written").len();
     assert!(bytes < MAX_BYTES, "{bytes} bytes");
 }
@@ -146,7 +192,7 @@ fn real() {
         let [recording, out] = [&recording, &report].map(|path| path.to_str().expect("UTF-8"));
         truedepth(&["audit", recording, "-o", out]);
         let page = report.join("report.html");
-        look(&browser, &page, name, &EVERY_WAY[1..3]);
+        look(&browser, &page, name, &EVERY_WAY[1..3], &[]);
         let bytes = std::fs::metadata(&page).expect("it was written").len();
         assert!(bytes < MAX_BYTES, "{name}: {bytes} bytes");
         println!("{name}: report.html takes {:.2} MB", bytes as f64 / 1e6);

@@ -119,7 +119,9 @@ fn a_simulated_fault_is_found_whatever_the_number_of_threads() {
     };
     let (one, three) = (audit("1", "one").code(3), audit("3", "three").code(3));
     assert!(one.stdout == three.stdout, "same input, same bytes");
-    assert!(read(scratch.join("one/report.html")) == read(scratch.join("three/report.html")));
+    // The page names its own folder in the commands that it shows.
+    let page = read(scratch.join("three/report.html")).replace("three/report.json", "one/report.json");
+    assert!(read(scratch.join("one/report.html")) == page);
 
     let report = json(&one.stdout);
     let truth = json(&read(scratch.join("rec/truth.json")));
@@ -212,4 +214,85 @@ fn explain_says_every_code() {
         assert!(text.len() > 400, "{code} is hardly explained: {text}");
     }
     truedepth(["explain", "TD999"]).code(1).says(&["TD999", "TD201"]);
+}
+
+/// What the summary says to type next, word for word; no name here has a blank in it.
+fn commands_of(summary: &str) -> Vec<Vec<&str>> {
+    summary
+        .lines()
+        .filter_map(|line| line.strip_prefix("  truedepth "))
+        .map(|command| command.split(' ').collect())
+        .collect()
+}
+
+#[test]
+fn what_to_type_next_is_typed_and_helps() {
+    let scratch = Scratch::new();
+    let simulate = "simulate --device ipad-12.9-5gen --fault focal=6.6% --fault depth-scale=1.5% --frames 14 -o ipad";
+    truedepth_in(scratch.path(), simulate.split(' ')).code(0);
+    let run = truedepth_in(scratch.path(), ["audit", "ipad"]).code(3);
+    let commands = commands_of(&run.stdout);
+    assert_eq!(
+        commands[0].join(" "),
+        "correct ipad -o ipad-corrected --with ipad-report/report.json"
+    );
+    truedepth_in(scratch.path(), commands[0].iter().copied()).code(0);
+    let checked = truedepth_in(scratch.path(), commands[1].iter().copied()).code(0);
+    assert!(checked.stdout.contains("This recording shows no fault."), "{checked:#?}");
+    assert_eq!(commands_of(&checked.stdout), [[""; 0]; 0], "nothing is left to type");
+    truedepth_in(scratch.path(), commands[2].iter().copied()).code(0);
+    let page = read(scratch.join("ipad-report/report.html"));
+    for command in &commands[..2] {
+        let command = format!("truedepth {}", command.join(" "));
+        assert!(
+            page.contains(&format!("data-copy=\"{command}\"")),
+            "{command}: the page says the same"
+        );
+    }
+}
+
+#[test]
+fn several_recordings_stand_beside_each_other_at_the_end() {
+    let scratch = Scratch::new();
+    for name in ["one", "two"] {
+        scratch.blank_recording(name);
+    }
+    let run = truedepth_in(scratch.path(), ["audit", "one", "two"]);
+    let (_, end) = run.stdout.split_once("\n2 recordings\n").expect("an overview");
+    assert!(end.contains("  one\n") || end.contains("  one "), "{end}");
+    assert!(end.contains("cannot tell"), "{end}");
+    assert!(!truedepth_in(scratch.path(), ["audit", "one"]).stdout.contains("1 recording"));
+}
+
+#[cfg(not(any(target_os = "macos", windows)))]
+#[test]
+fn a_report_that_nothing_opens_is_a_report_all_the_same() {
+    use std::{os::unix::fs::PermissionsExt, process::Command};
+    let scratch = Scratch::new();
+    scratch.blank_recording("rec");
+    let audit = |programs: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_truedepth"));
+        command.args(["audit", "rec", "--open"]).current_dir(scratch.path()).env("PATH", programs);
+        Run::of(&mut command)
+    };
+    let run = audit("nowhere");
+    assert!(matches!(run.code, Some(0 | 3)), "the audit has run: {run:#?}");
+    run.says(&[
+        "error: no program opens rec-report/report.html",
+        "xdg-open",
+        "hint: open file:///",
+    ]);
+
+    // One that fails is passed over; one that works gets the page.
+    fs::create_dir(scratch.join("bin")).expect("a folder");
+    for (name, script) in [
+        ("xdg-open", "#!/bin/sh\nexit 3\n".to_owned()),
+        ("gio", format!("#!/bin/sh\necho \"$@\" > {}\n", scratch.join("shown").display())),
+    ] {
+        let path = scratch.write(&format!("bin/{name}"), script);
+        fs::set_permissions(path, fs::Permissions::from_mode(0o755)).expect("it is ours");
+    }
+    let run = audit(&scratch.join("bin").display().to_string());
+    assert!(!run.stderr.contains("error"), "{run:#?}");
+    assert_eq!(read(scratch.join("shown")), "open rec-report/report.html\n");
 }

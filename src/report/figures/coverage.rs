@@ -79,7 +79,11 @@ pub(in crate::report) fn image_coverage(audit: &Audit) -> Option<Figure> {
         .iter()
         .flat_map(|view| &view.corners)
         .map(|corner| {
-            format!("M{} {}h0", n(scale * (corner.pixel.x + 0.5)), n(scale * (corner.pixel.y + 0.5)))
+            format!(
+                "M{} {}h0",
+                n(scale * (corner.pixel.x + 0.5)),
+                n(scale * (corner.pixel.y + 0.5))
+            )
         })
         .collect();
     let (width, height) = (WIDTH / PARTS as f64, drawn_height / PARTS as f64);
@@ -155,8 +159,8 @@ pub(in crate::report) fn view_angles(audit: &Audit) -> Option<Figure> {
     let [cx, cy] = CENTER.map(n);
     let [low, high] = BEST_DEG.map(radius);
     let sides = [
-        ("right side nearest", [CENTER[0] + RADIUS + 8.0, CENTER[1]], "start"),
-        ("left side nearest", [CENTER[0] - RADIUS - 8.0, CENTER[1]], "end"),
+        ("right nearest", [CENTER[0] + RADIUS + 8.0, CENTER[1]], "start"),
+        ("left nearest", [CENTER[0] - RADIUS - 8.0, CENTER[1]], "end"),
         ("top nearest", [CENTER[0], CENTER[1] - RADIUS - 12.0], "middle"),
         ("bottom nearest", [CENTER[0], CENTER[1] + RADIUS + 14.0], "middle"),
     ];
@@ -211,7 +215,13 @@ pub(in crate::report) fn view_angles(audit: &Audit) -> Option<Figure> {
         view_box: "0 0 480 344".to_owned(),
         drawing,
         table: Table {
-            header: vec!["frame", "tilt, degrees", "nearest side, degrees", "distance, mm", "corners"],
+            header: vec![
+                "frame",
+                "tilt, degrees",
+                "nearest side, degrees",
+                "distance, mm",
+                "corners",
+            ],
             rows: tilts
                 .iter()
                 .map(|(tilt, view)| {

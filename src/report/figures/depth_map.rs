@@ -45,7 +45,8 @@ impl Cells {
     fn grouped(&self, values: impl Iterator<Item = (Pixel, f64)>) -> BTreeMap<usize, Vec<f64>> {
         let mut cells: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
         for (pixel, value) in values.filter(|(p, v)| (p.x + p.y + v).is_finite()) {
-            let [column, row] = [pixel.x, pixel.y].map(|x| ((x + 0.5) / self.side_px).max(0.0) as usize);
+            let [column, row] =
+                [pixel.x, pixel.y].map(|x| ((x + 0.5) / self.side_px).max(0.0) as usize);
             cells.entry(row * self.columns + column.min(self.columns - 1)).or_default().push(value);
         }
         cells
@@ -155,10 +156,7 @@ pub(in crate::report) fn error_map(audit: &Audit) -> Option<Figure> {
         legend: Vec::new(),
         view_box: cells.view_box(),
         drawing: cells.drawing(&heat, &tiles, &bar),
-        table: Table {
-            header: vec!["x, px", "y, px", "factory, mm", "own, mm", "corners"],
-            rows,
-        },
+        table: Table { header: vec!["x, px", "y, px", "factory, mm", "own, mm", "corners"], rows },
     })
 }
 

@@ -5,10 +5,7 @@
 
 use maud::{Markup, html};
 
-use crate::report::{
-    svg::{n, round_step},
-    words::trimmed,
-};
+use crate::report::{svg::n, words::trimmed};
 
 /// Shades on either side of the middle of a diverging ramp, and of a sequential one above its first.
 const SHADES: usize = 4;
@@ -52,7 +49,7 @@ impl Heat {
         let mut sizes: Vec<f64> = values.filter(|v| v.is_finite()).map(f64::abs).collect();
         sizes.sort_by(f64::total_cmp);
         let large = sizes.get(sizes.len().saturating_sub(1) * 19 / 20).copied().unwrap_or(0.0);
-        Self { ramp, reach: round_step(large.max(least)) }
+        Self { ramp, reach: round_reach(large.max(least)) }
     }
 
     /// −4 to 4.
@@ -128,12 +125,22 @@ impl Heat {
                     @let x = if shade == first { 0.0 } else { at(shade) + 0.5 * STEP };
                     text x=(n(x)) y="28" text-anchor=(anchor) { (words(shade)) }
                 }
-                text x=(n(width + 34.0)) y="11" {
+                text x=(n(width + 22.0)) y="11" {
                     @if first < 0 { "− " (ends[0]) " · + " (ends[1]) } @else { (ends[1]) }
                 }
             }
         }
     }
+}
+
+/// The least number of a fine set of round ones that is not below `reach`: shades must not be spent on what is not there.
+fn round_reach(reach: f64) -> f64 {
+    if !(reach.is_finite() && reach > 0.0) {
+        return 1.0;
+    }
+    let power = 10f64.powf(reach.log10().floor());
+    let round = [1.0, 1.2, 1.6, 2.0, 2.4, 3.0, 4.0, 5.0, 6.0, 8.0];
+    round.into_iter().find(|r| r * power >= reach * (1.0 - 1e-9)).unwrap_or(10.0) * power
 }
 
 fn signed_trimmed(value: f64) -> String {
@@ -163,16 +170,16 @@ mod tests {
         let least = Heat::new(Ramp::Sequential, [1e-9].into_iter(), 0.5);
         assert_eq!((least.reach, least.class(1e-9)), (0.5, "shade q0".to_owned()));
         assert_eq!(Heat::new(Ramp::Sequential, std::iter::empty(), 0.5).reach, 0.5);
+        assert_eq!(
+            [5.5, 0.1, 97.0, 0.0].map(round_reach).map(|r| trimmed(r, 3)),
+            ["6", "0.1", "100", "1"]
+        );
     }
 
     #[test]
     fn a_cell_without_a_number_is_not_drawn() {
-        let tile = |value| Tile {
-            area: [0.0, 0.0, 9.0, 9.0],
-            value,
-            label: None,
-            tip: "tip".to_owned(),
-        };
+        let tile =
+            |value| Tile { area: [0.0, 0.0, 9.0, 9.0], value, label: None, tip: "tip".to_owned() };
         let heat = Heat { ramp: Ramp::Diverging, reach: 1.0 };
         let drawn = heat.tiles(&[tile(f64::NAN), tile(0.9), tile(-0.9)]).into_string();
         assert_eq!((drawn.matches("<rect").count(), drawn.matches("<path").count()), (2, 2));

@@ -27,10 +27,7 @@ pub(in crate::report) fn projection_uncertainty(audit: &Audit) -> Option<Figure>
     let scale = WIDTH / pinhole.width as f64;
     let drawn_height = pinhole.height as f64 * scale;
     let finite = || grid.sigma_px.iter().copied().filter(|s| s.is_finite());
-    let [least, most] = [
-        finite().min_by(f64::total_cmp)?,
-        finite().max_by(f64::total_cmp)?,
-    ];
+    let [least, most] = [finite().min_by(f64::total_cmp)?, finite().max_by(f64::total_cmp)?];
     let decimals = if most < 0.2 { 3 } else { 2 };
     let heat = Heat::new(Ramp::Sequential, grid.sigma_px.iter().copied(), 0.0);
     // Each place stands for what is nearest to it: cells at the border are half as wide.

@@ -11,7 +11,7 @@ use crate::{
     },
 };
 
-/// RMS of every view, by the own camera, with the factory's intrinsics beside it.
+/// RMS of every view, by the own camera and the board's shape as calibrated, with the factory's intrinsics beside it.
 pub(in crate::report) fn rms_by_view(audit: &Audit) -> Option<Figure> {
     let views: Vec<(usize, Option<f64>, Option<f64>, usize)> = audit
         .frames
@@ -21,10 +21,13 @@ pub(in crate::report) fn rms_by_view(audit: &Audit) -> Option<Figure> {
             let rms = |view: Option<&crate::pose::View>| {
                 view.map(|v| v.rms_px).filter(|rms| rms.is_finite())
             };
+            // The calibration's own views know the board's shape.
+            let calibrated =
+                audit.calibration.iter().flat_map(|c| &c.views).find(|view| view.frame == frame);
             (
                 frame,
                 rms(f.factory_view.as_ref()),
-                rms(f.own_view.as_ref()),
+                rms(calibrated.or(f.own_view.as_ref())),
                 f.observation.corners.len(),
             )
         })

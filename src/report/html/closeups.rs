@@ -8,7 +8,7 @@ use crate::{
     calibrate::Estimate,
     camera::{Camera, Distortion},
     depth::{BoardDepth, MAX_ERROR_M},
-    diagnose::Correction,
+    diagnose::{Correction, Verdict},
     geom::{Board, Color, Pixel, Pose},
     pose::View,
     report::{
@@ -56,6 +56,19 @@ struct State {
     /// Depth = (sensor − bias) / scale.
     scale: f64,
     bias_m: f64,
+    /// Where a pixel of the depth map belongs in the colour image; nothing where that is the same pixel.
+    moved: Option<Moved>,
+    /// Images and world are mirrored: in the board's frame that is before and behind.
+    mirrored: bool,
+}
+
+/// The depth pixel q, mirrored first where so, belongs to the colour pixel centre + zoom · (q − shift − centre).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+struct Moved {
+    mirrored: bool,
+    zoom: f64,
+    shift_px: [f64; 2],
+    center_px: [f64; 2],
 }
 
 #[derive(Serialize)]
@@ -70,12 +83,64 @@ struct Frame {
     words: Vec<String>,
 }
 
+/// What the faults of an audit ask to be done to depth and images, beside the camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Corrected {
+    scale: f64,
+    bias_m: f64,
+    moved: Option<Moved>,
+    mirrored: bool,
+}
+
+impl Corrected {
+    const NOTHING: Self = Self { scale: 1.0, bias_m: 0.0, moved: None, mirrored: false };
+
+    /// As `truedepth correct` would: by the corrections that the faults name.
+    fn of(audit: &Audit, center_px: [f64; 2]) -> Self {
+        let mut all = Self::NOTHING;
+        let nowhere = Moved { mirrored: false, zoom: 1.0, shift_px: [0.0; 2], center_px };
+        let faults = audit.findings.iter().filter(|f| f.verdict == Verdict::Fault);
+        for correction in faults.filter_map(|f| f.correction.as_ref()) {
+            match *correction {
+                Correction::Depth { scale, bias_m } => (all.scale, all.bias_m) = (scale, bias_m),
+                // Zoom and shift are findings of their own, each with the other left alone.
+                Correction::Align { zoom, shift_px } => {
+                    let moved = all.moved.get_or_insert(nowhere);
+                    moved.zoom *= zoom;
+                    moved.shift_px = [0, 1].map(|axis| moved.shift_px[axis] + shift_px[axis]);
+                }
+                Correction::UnmirrorDepth => all.moved.get_or_insert(nowhere).mirrored = true,
+                Correction::Unmirror => all.mirrored = true,
+                _ => {}
+            }
+        }
+        all
+    }
+
+    fn words(&self) -> String {
+        let mut words = String::new();
+        let is_scaled = self.scale != 1.0 || self.bias_m != 0.0;
+        let moved = self.moved.is_some_and(|m| m.zoom != 1.0 || m.shift_px != [0.0; 2]);
+        let turned = self.moved.is_some_and(|m| m.mirrored);
+        for (is_so, what) in [
+            (is_scaled, ", depth corrected"),
+            (moved, ", depth moved to its colour"),
+            (turned, ", depth mirrored back"),
+            (self.mirrored, ", images mirrored back"),
+        ] {
+            if is_so {
+                words.push_str(what);
+            }
+        }
+        words
+    }
+}
+
 /// One way to see the recording: with the factory's camera as it is, or with the own camera and corrected depth.
 struct Case<'a> {
     label: String,
     camera: Camera,
-    scale: f64,
-    bias_m: f64,
+    corrected: Corrected,
     depth: Option<&'a BoardDepth>,
     view: fn(&FrameAudit) -> Option<&View>,
 }
@@ -84,23 +149,16 @@ fn cases(audit: &Audit) -> Vec<Case<'_>> {
     let factory = audit.factory.as_ref().map(|factory| Case {
         label: "before: as the factory says".to_owned(),
         camera: Camera { intrinsics: factory.intrinsics, distortion: Distortion::None },
-        scale: 1.0,
-        bias_m: 0.0,
+        corrected: Corrected::NOTHING,
         depth: audit.factory_depth.as_ref(),
         view: |frame| frame.factory_view.as_ref(),
     });
-    let correction = audit.findings.iter().find_map(|finding| match finding.correction {
-        Some(Correction::Depth { scale, bias_m }) => Some((scale, bias_m)),
-        _ => None,
-    });
     let own = audit.camera.as_ref().map(|camera| {
-        let (scale, bias_m) = correction.unwrap_or((1.0, 0.0));
-        let depth = if correction.is_some() { ", depth corrected" } else { "" };
+        let corrected = Corrected::of(audit, [camera.intrinsics.cx, camera.intrinsics.cy]);
         Case {
-            label: format!("after: own camera{depth}"),
+            label: format!("after: own camera{}", corrected.words()),
             camera: camera.clone(),
-            scale,
-            bias_m,
+            corrected,
             depth: audit.own_depth.as_ref(),
             view: |frame| frame.own_view.as_ref(),
         }
@@ -124,8 +182,10 @@ impl State {
             label: case.label.clone(),
             nodes,
             rays: (0..nodes[0] * nodes[1]).map(node).collect(),
-            scale: case.scale,
-            bias_m: case.bias_m,
+            scale: case.corrected.scale,
+            bias_m: case.corrected.bias_m,
+            moved: case.corrected.moved,
+            mirrored: case.corrected.mirrored,
         }
     }
 }
@@ -152,11 +212,7 @@ fn words_of(case: &Case<'_>, frame: usize) -> String {
                 "At the corners the sensor sees the surface {} mm {side} the board (median of {}{}).",
                 plain(1e3 * error_m.abs(), 2),
                 words::count(depth.samples.len() - depth.n_beyond, "corner"),
-                if case.scale == 1.0 && case.bias_m == 0.0 {
-                    ""
-                } else {
-                    ", before the depth is corrected"
-                }
+                if case.corrected == Corrected::NOTHING { "" } else { ", before the correction" }
             )
         }
     }
@@ -268,7 +324,7 @@ fn space(cases: &[Case<'_>], audit: &Audit) -> Markup {
             }
             canvas id="space-view" tabindex="0" role="img" aria-labelledby="space-title" aria-describedby="space-words"
                 width="900" height="560" {}
-            div class="scale-of-colours" id="space-scale" hidden {
+            div class="scale-of-colours off-board" id="space-scale" hidden {
                 span { "20 mm in front" } span class="ramp" {} span { "20 mm behind the board" }
             }
             output id="space-words" aria-live="polite" {}
@@ -324,11 +380,21 @@ fn depth_over_colour(audit: &Audit, shown: &[&Closeup]) -> Markup {
     html! {
         figure class="figure compare" id="over" {
             h3 { "Depth over colour" }
+            fieldset class="choice" {
+                legend { "Show" }
+                label { input type="radio" name="over-shows" value="depth" checked; " depth" }
+                label { input type="radio" name="over-shows" value="distance"; " distance from the board" }
+            }
             (stage(&[("left", "Its depth")], "How much of the picture shows depth, percent", 50))
             div class="scale-of-colours" { span class="near" {} span class="ramp" {} span class="far" {} }
+            div class="scale-of-colours off-board" hidden {
+                span { "20 mm in front" } span class="ramp" {} span { "20 mm behind the board" }
+            }
+            output {}
             figcaption {
                 "Left of the line depth, right of it colour; grey is without measurement. Depth should end where \
-                 things end in the image."
+                 things end in the image. Distance from the board is the error of every single pixel: of a true \
+                 recording the board is pale all over, before or after the correction as chosen above."
             }
             (table.to_html("Numbers behind “Depth over colour”"))
         }

@@ -5,23 +5,71 @@ use maud::{Markup, html};
 use crate::{
     audit::Audit,
     diagnose::{Correction, Evidence, Finding, Verdict},
-    report::{figures, words},
+    report::{
+        figures,
+        next::{Typed, explain_command, next_steps},
+        words,
+    },
 };
 
-/// The outcome in one sentence, what needs a reader at length, and the rest as a list.
-pub(super) fn findings(audit: &Audit) -> Markup {
+/// The outcome in one sentence, what to type next, what needs a reader at length, and the rest as a list.
+pub(super) fn findings(audit: &Audit, typed: &Typed) -> Markup {
     let (verdict, headline) = words::headline(audit);
     let findings = words::by_severity(audit);
-    let (loud, quiet): (Vec<&Finding>, Vec<&Finding>) = findings
-        .into_iter()
-        .partition(|f| matches!(f.verdict, Verdict::Fault | Verdict::Warning | Verdict::Unknown));
+    let of = |wanted: &[Verdict]| -> Vec<&Finding> {
+        findings.iter().copied().filter(|f| wanted.contains(&f.verdict)).collect()
+    };
+    let passed = of(&[Verdict::Ok]);
+    let nothing_else = passed.len() == findings.len();
     html! {
         section id="findings" aria-labelledby="headline" {
             p id="headline" class=(format!("headline {}", verdict.name())) { (headline) }
-            @for finding in &loud { (full(audit, finding)) }
-            @if !quiet.is_empty() {
-                ul class="quiet" { @for finding in &quiet { li id=(finding.code.name()) { (short(audit, finding)) } } }
+            (next(audit, typed))
+            @for finding in of(&[Verdict::Fault, Verdict::Warning]) { (full(audit, finding)) }
+            @for group in words::cannot_tell(audit) { (cannot_tell(audit, &group)) }
+            (list(audit, &of(&[Verdict::Info])))
+            @if !passed.is_empty() {
+                details class="passed" open[nothing_else] {
+                    summary { (chip(Verdict::Ok)) " " (words::count(passed.len(), "check")) " passed" }
+                    (list(audit, &passed))
+                }
             }
+        }
+    }
+}
+
+/// What to type next, each command with a button that copies it.
+fn next(audit: &Audit, typed: &Typed) -> Markup {
+    let mut steps = next_steps(audit, typed);
+    // Each finding has that beside it.
+    steps.retain(|step| !step.command.contains(" explain "));
+    html! {
+        @if !steps.is_empty() {
+            div class="next" role="group" aria-labelledby="next-title" {
+                p id="next-title" { "What to type next" }
+                dl {
+                    @for step in &steps {
+                        dt { "To " (step.to) }
+                        dd { (command(&step.command)) }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn command(command: &str) -> Markup {
+    html! {
+        code { (command) }
+        button type="button" class="copy" data-copy=(command) aria-label=(format!("Copy {command}")) hidden { "Copy" }
+    }
+}
+
+/// Running text: what stands between backticks is a command.
+fn prose(text: &str) -> Markup {
+    html! {
+        @for (index, part) in text.split('`').enumerate() {
+            @if index % 2 == 1 { code { (part) } } @else { (words::unbroken(part)) }
         }
     }
 }
@@ -58,39 +106,101 @@ fn full(audit: &Audit, finding: &Finding) -> Markup {
                 @if let Some(gauge) = figures::finding_gauge(finding) { (gauge) }
             }
             div class="words" {
-                p class="summary" { (words::unbroken(&sentence)) }
+                p class="summary" { (prose(&sentence)) }
                 @if !finding.what_to_do.is_empty() {
-                    p class="to-do" { strong { "What to do. " } (words::unbroken(&finding.what_to_do)) }
+                    p class="to-do" { strong { "What to do. " } (prose(&finding.what_to_do)) }
                 }
                 @if let Some(correction) = &finding.correction {
                     p class="correction" {
-                        strong { "What would make it true. " }
+                        strong { "The correction. " }
                         (words::unbroken(&correction_words(correction)))
                     }
                 }
-                @for (command, what_for) in words::next_commands(audit, finding) {
-                    p class="command" {
-                        (what_for) ": " code { (command) }
-                        button type="button" class="copy" data-copy=(command) hidden { "Copy" }
-                    }
-                }
                 (evidence(audit, finding))
+                p class="command" { "Read more: " (command(&explain_command(finding))) }
             }
         }
     }
 }
 
-fn short(audit: &Audit, finding: &Finding) -> Markup {
-    let (sentence, _) = words::sentence_and_test(&finding.summary);
+/// Checks that cannot tell, for one reason or with one remedy.
+fn cannot_tell(audit: &Audit, group: &words::CannotTell<'_>) -> Markup {
+    let titles: Vec<String> = group
+        .findings
+        .iter()
+        .enumerate()
+        .map(|(i, f)| if i == 0 { f.title().to_owned() } else { f.title().to_lowercase() })
+        .collect();
+    let title = match titles.len() {
+        0..=3 => titles.join(", "),
+        n => format!("{n} checks"),
+    };
     html! {
-        (chip(finding.verdict))
-        span class="code" { (finding.code) }
+        article class="finding unknown group" {
+            header {
+                (chip(Verdict::Unknown))
+                h2 { (title) }
+            }
+            div class="words" {
+                @if let Some(why) = &group.why { p class="summary" { (prose(why)) } }
+                @if !group.what_to_do.is_empty() {
+                    p class="to-do" { strong { "What to record. " } (prose(group.what_to_do)) }
+                }
+            }
+            ul class=(if group.why.is_some() { "checks waiting" } else { "checks" }) {
+                @for finding in &group.findings {
+                    li id=(finding.code.name()) {
+                        span class="code" { (finding.code) }
+                        @if group.why.is_some() {
+                            details class="data" {
+                                summary { (finding.title()) }
+                                p { (prose(&finding.summary)) }
+                                (evidence(audit, finding))
+                            }
+                        } @else { (open_question(audit, finding)) }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// A check that has a number, if not one that decides.
+fn open_question(audit: &Audit, finding: &Finding) -> Markup {
+    let difference = words::difference(finding);
+    html! {
         div {
-            strong { (finding.title()) ". " } (words::unbroken(&sentence))
-            @if !finding.what_to_do.is_empty() { " " (words::unbroken(&finding.what_to_do)) }
-            details class="data" {
-                summary { "Evidence" }
-                (evidence(audit, finding))
+            p { (prose(&words::sentence_and_test(&finding.summary).0)) }
+            details class="data" { summary { "Evidence" } (evidence(audit, finding)) }
+        }
+        div class="measure" {
+            @if !difference.is_empty() { p class="value" { (difference) } }
+            @if let Some(gauge) = figures::finding_gauge(finding) { (gauge) }
+        }
+    }
+}
+
+/// Findings that need no reader: a line each, which opens.
+fn list(audit: &Audit, findings: &[&Finding]) -> Markup {
+    html! {
+        @if !findings.is_empty() {
+            ul class="quiet" {
+                @for finding in findings {
+                    @let (sentence, _) = words::sentence_and_test(&finding.summary);
+                    li id=(finding.code.name()) {
+                        details {
+                            summary {
+                                (chip(finding.verdict))
+                                span class="code" { (finding.code) }
+                                span {
+                                    strong { (finding.title()) ". " } (prose(&sentence))
+                                    @if !finding.what_to_do.is_empty() { " " (prose(&finding.what_to_do)) }
+                                }
+                            }
+                            (evidence(audit, finding))
+                        }
+                    }
+                }
             }
         }
     }
@@ -101,7 +211,12 @@ fn evidence(audit: &Audit, finding: &Finding) -> Markup {
     let (_, test) = words::sentence_and_test(&finding.summary);
     let how_sure = words::how_sure(finding);
     let frames = words::frames_behind(audit, finding.code);
+    let is_bare =
+        how_sure.is_none() && test.is_none() && frames.is_none() && finding.evidence.is_empty();
     html! {
+        @if is_bare && finding.verdict != Verdict::Unknown {
+            p class="evidence-list" { "It follows from the files alone; there are no further numbers." }
+        }
         @if how_sure.is_some() || test.is_some() || frames.is_some() {
             dl class="evidence-list" {
                 @if let Some(how_sure) = how_sure { dt { "How sure" } dd { (words::unbroken(&how_sure)) } }
@@ -148,14 +263,22 @@ fn correction_words(correction: &Correction) -> String {
         Correction::Undistort { tables: None } => {
             "Resample the images to straight lines with the own camera model.".to_owned()
         }
+        Correction::Depth { scale, bias_m } if bias_m.abs() < 5e-6 => {
+            format!("Divide every depth by {}.", words::plain(*scale, 5))
+        }
         Correction::Depth { scale, bias_m } => format!(
             "Take {} mm from every depth, then divide it by {}.",
             words::plain(1e3 * bias_m, 2),
             words::plain(*scale, 5)
         ),
-        Correction::Align { zoom, shift_px: [x, y] } => format!(
-            "Resample depth to colour: zoom {}, shift {} px to the right and {} px down.",
-            words::plain(*zoom, 4),
+        Correction::Align { zoom, shift_px: [0.0, 0.0] } => {
+            format!(
+                "Resample depth to colour: zoom {} about the principal point.",
+                words::plain(*zoom, 4)
+            )
+        }
+        Correction::Align { shift_px: [x, y], .. } => format!(
+            "Resample depth to colour: it lies {} px too far right and {} px too far down.",
             words::plain(*x, 2),
             words::plain(*y, 2)
         ),

@@ -10,6 +10,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use self::{findings::chip, script::SCRIPT};
 use super::{
     figures::{self, Figure},
+    next::{Typed, known_of_this_camera},
     pictures::Pictures,
     words,
 };
@@ -19,10 +20,11 @@ use crate::audit::Audit;
 const POLICY: &str = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'; \
                       base-uri 'none'; form-action 'none'";
 
-/// The report as one HTML file, with these pictures of the recording; without any it is the numbers alone.
+/// The report as one HTML file, with these pictures of the recording (without any it is the numbers alone) and the
+/// commands that follow from what was typed.
 ///
 /// Everything that comes out of a file is escaped. The same audit and pictures give the same bytes.
-pub fn page(audit: &Audit, pictures: &Pictures) -> String {
+pub fn page(audit: &Audit, pictures: &Pictures, typed: &Typed) -> String {
     let title = format!("{} · truedepth audit", audit.name);
     let closeups = closeups::closeups(audit, pictures);
     let gallery = gallery::gallery(audit, &pictures.photos);
@@ -48,7 +50,7 @@ pub fn page(audit: &Audit, pictures: &Pictures) -> String {
                 a class="skip" href="#findings" { "Skip to the findings" }
                 (header(audit, &parts))
                 main {
-                    (findings::findings(audit))
+                    (findings::findings(audit, typed))
                     (quantities(audit))
                     @if let Some(closeups) = closeups { (closeups) }
                     @for (id, _, question, figures) in evidence {
@@ -121,6 +123,7 @@ fn header(audit: &Audit, parts: &[(&str, &str)]) -> Markup {
             h1 { (audit.name) }
             p class="device" { (words::camera_line(audit)) }
             p class="board" { (words::board_line(audit)) }
+            @if let Some(known) = known_of_this_camera(audit) { p class="known" { (known) } }
             nav aria-label="Parts of this page" {
                 @for (id, words) in parts { a href=(format!("#{id}")) { (words) } " " }
             }
@@ -223,6 +226,10 @@ mod tests {
     use super::*;
     use crate::report::sample;
 
+    fn page(audit: &Audit, pictures: &Pictures) -> String {
+        super::page(audit, pictures, &Typed::of(audit))
+    }
+
     /// Elements that never have an end tag.
     const VOID: [&str; 3] = ["meta", "img", "input"];
 
@@ -273,7 +280,7 @@ mod tests {
     #[test]
     fn well_formed_and_alone() {
         let pictures = sample::pictures();
-        let page = page(&sample::audit(), &pictures);
+        let page = page(&sample::rich_audit(), &pictures);
         assert_well_formed(&page);
         assert!(!page.contains("http://") && !page.contains("https://"), "the page loads nothing");
         assert!(!page.contains("url(") && !page.contains("@import"), "the style loads nothing");
@@ -291,27 +298,14 @@ mod tests {
         unique.sort_unstable();
         unique.dedup();
         assert_eq!(unique.len(), ids.len(), "{ids:?}");
-        for figure in [
-            "depth-factory",
-            "depth-own",
-            "depth-error",
-            "depth-frames",
-            "depth-range",
-            "focal",
-            "lens",
-            "models",
-            "residuals",
-            "views",
-            "frames",
-        ] {
-            assert!(ids.contains(&figure), "no figure {figure}");
-        }
+        let shown: Vec<&str> = ids.into_iter().filter(|id| figures::FIGURES.contains(id)).collect();
+        assert_eq!(shown, figures::FIGURES);
         assert!(page.len() < 1_000_000, "{} bytes", page.len());
     }
 
     #[test]
     fn every_image_and_drawing_has_words() {
-        let page = page(&sample::audit(), &sample::pictures());
+        let page = page(&sample::rich_audit(), &sample::pictures());
         for tag in tags(&page).into_iter().filter(|tag| !tag.starts_with('/')) {
             match name(tag) {
                 "img" => assert!(tag.contains(" alt=\""), "{tag}"),
@@ -354,7 +348,7 @@ mod tests {
 
     #[test]
     fn numbers_that_are_none_do_not_break_a_drawing() {
-        let mut audit = sample::audit();
+        let mut audit = sample::rich_audit();
         let calibration = audit.calibration.as_mut().expect("the sample has one");
         for candidate in &mut calibration.candidates {
             candidate.held_out_rms_px = f64::NAN;
@@ -363,6 +357,9 @@ mod tests {
         for view in &mut calibration.views {
             view.residuals_px[0] = [f64::NAN, 0.0];
         }
+        calibration.surface.as_mut().expect("the sample has one").heights_m[3] = f64::NAN;
+        let registration = audit.registration.as_mut().expect("the sample has one");
+        registration.pattern.cells.iter_mut().for_each(|cell| cell.median_m = f64::NAN);
         for finding in &mut audit.findings {
             finding.value = Some(f64::NAN);
             finding.sigma = Some(f64::INFINITY);

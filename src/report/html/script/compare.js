@@ -41,6 +41,24 @@ if (closeups) {
     scale.querySelector(".far").textContent = `${(1000 * far).toFixed(0)} mm away`;
   };
 
+  const over = document.getElementById("over");
+  const shows_distance = () => over.querySelector("[name=over-shows]:checked").value === "distance";
+  const paint_distance = ([canvas], frame) => {
+    const state = closeups.state();
+    paint(canvas, frame, (i) => {
+      const off_m = closeups.distance_m(state, frame, i);
+      return off_m === off_m ? closeups.colour_of_distance(off_m) : HOLE;
+    });
+  };
+  const paint_over = (canvases, frame) => {
+    const is_distance = shows_distance();
+    (is_distance ? paint_distance : paint_depth)(canvases, frame);
+    const [of_depth, of_distance] = over.querySelectorAll(".scale-of-colours");
+    of_depth.hidden = is_distance;
+    of_distance.hidden = !is_distance;
+    over.querySelector("output").textContent = is_distance ? closeups.scene.states[closeups.state()].label : "";
+  };
+
   // On a plane the reciprocal of depth is linear in the pixels, at whatever tilt, so its second difference shows where
   // the surface bends or jumps. What is large is told by how large it mostly is.
   const paint_edges = (canvases, frame) => {
@@ -75,9 +93,9 @@ if (closeups) {
     canvas.style.transform = `translate(${offset[0]}%, ${offset[1]}%) scale(${zoom})`;
   };
 
-  for (const [id, painter] of [["over", paint_depth], ["edges", paint_edges]]) {
+  for (const [id, painter] of [["over", paint_over], ["edges", paint_edges]]) {
     const figure = document.getElementById(id);
-    const [stage, image, slider] = [".stage", "img", "input"].map((selector) => figure.querySelector(selector));
+    const [stage, image, slider] = [".stage", "img", "input[type=range]"].map((selector) => figure.querySelector(selector));
     const canvases = [...figure.querySelectorAll("canvas")];
     let frame = null;
     const cut = () => stage.style.setProperty("--cut", `${slider.value}%`);
@@ -98,7 +116,10 @@ if (closeups) {
       if (event.buttons > 0) pull(event);
       const [x, y] = place(event).map((share, axis) => Math.floor(share * (axis ? frame.rows : frame.columns)));
       const z = frame.depth_m[y * frame.columns + x];
-      const words = z === z ? `${(1000 * z).toFixed(1)} mm` : "no measurement";
+      const off_mm = 1000 * closeups.distance_m(closeups.state(), frame, y * frame.columns + x);
+      const side = off_mm < 0 ? "in front of" : "behind";
+      const off = off_mm === off_mm ? `, ${Math.abs(off_mm).toFixed(1)} mm ${side} the board's plane` : "";
+      const words = z === z ? `${(1000 * z).toFixed(1)} mm${off}` : "no measurement";
       const [left, top] = [event.clientX, event.clientY - 6];
       tip.show(`(${x * frame.step}, ${y * frame.step}) px: ${words}`, { left, right: left, top, bottom: top + 20 });
     });
@@ -113,5 +134,6 @@ if (closeups) {
       }
     });
     cut();
+    figure.addEventListener("change", (event) => event.target.type === "radio" && painter(canvases, frame));
   }
 }

@@ -8,9 +8,6 @@ if (closeups) {
   const words = document.getElementById("space-words");
   const [columns, rows, square_m] = scene.board;
   const center = [(columns * square_m) / 2, (rows * square_m) / 2, 0];
-  // How far off the board a point is, from in front to behind.
-  const RAMP = [[196, 81, 26], [240, 170, 120], [225, 225, 225], [120, 180, 225], [0, 90, 160]];
-  const RANGE_M = 0.02;
   const SIDES = { oblique: [0.75, 0.45], edge: [1.5708, 0], front: [0, 0] };
   const START = { yaw: SIDES.oblique[0], pitch: SIDES.oblique[1], distance: 0.62, target: center };
 
@@ -22,51 +19,44 @@ if (closeups) {
 
   // --- What there is to draw ---
 
-  // x/z and y/z of a pixel, interpolated between the nodes of the state's grid.
-  const ray = ({ nodes: [n, m], rays }, x, y) => {
-    const gx = (x / (scene.size_px[0] - 1)) * (n - 1);
-    const gy = (y / (scene.size_px[1] - 1)) * (m - 1);
-    const [i, j] = [Math.min(Math.floor(gx), n - 2), Math.min(Math.floor(gy), m - 2)];
-    const [a, b, c, d] = [rays[j * n + i], rays[j * n + i + 1], rays[(j + 1) * n + i], rays[(j + 1) * n + i + 1]];
-    if (!a || !b || !c || !d) return null;
-    const [u, v] = [gx - i, gy - j];
-    return [0, 1].map((k) => (1 - v) * ((1 - u) * a[k] + u * b[k]) + v * ((1 - u) * c[k] + u * d[k]));
-  };
-
-  // R' (x - t): from the colour camera's frame to the board's.
-  const to_board = (pose, [x, y, z]) => {
-    const [a, b, c] = [x - pose[9], y - pose[10], z - pose[11]];
-    return [0, 1, 2].map((k) => pose[k] * a + pose[3 + k] * b + pose[6 + k] * c);
-  };
+  const { ray, belongs } = closeups;
+  const place = (pose, point) => closeups.place(state, pose, point);
 
   const cloud_of = (frame) => {
     const key = `${frame.frame} ${state}`;
     if (!clouds.has(key)) {
-      const { scale, bias_m } = scene.states[state];
+      const { scale, bias_m, moved } = scene.states[state];
       const pose = scene.poses[frame.frame][state];
       const points = [];
       const pixels = [];
+      // Which kept pixel of the photo has a point's colour.
+      const colours = [];
       for (let i = 0; pose && i < frame.depth_m.length; i++) {
         const z = (frame.depth_m[i] - bias_m) / scale;
         if (z !== z) continue;
-        const [x, y] = [(i % frame.columns) * frame.step, Math.floor(i / frame.columns) * frame.step];
+        const [x, y] = belongs(moved, (i % frame.columns) * frame.step, Math.floor(i / frame.columns) * frame.step);
         const direction = ray(scene.states[state], x, y);
         if (!direction) continue;
-        points.push(...to_board(pose, [direction[0] * z, direction[1] * z, z]));
+        points.push(...place(pose, [direction[0] * z, direction[1] * z, z]));
         pixels.push(i);
+        const [column, row] = [x, y].map((at) => Math.round(at / frame.step));
+        const is_inside = column >= 0 && row >= 0 && column < frame.columns && row < frame.rows;
+        colours.push(is_inside ? row * frame.columns + column : -1);
       }
-      clouds.set(key, { points: new Float32Array(points), pixels: new Uint32Array(pixels) });
+      clouds.set(key, { points: new Float32Array(points), pixels: new Uint32Array(pixels), colours: new Int32Array(colours) });
     }
     return clouds.get(key);
   };
+
+  const facing = (frame) => closeups.facing(state, frame);
 
   const pyramid = (pose, size_m) => {
     const corners = [[0, 0], [1, 0], [1, 1], [0, 1]].map(([x, y]) => {
       const direction = ray(scene.states[state], x * (scene.size_px[0] - 1), y * (scene.size_px[1] - 1));
       const [u, v] = direction ?? [x - 0.5, 0.75 * (y - 0.5)];
-      return to_board(pose, [u * size_m, v * size_m, size_m]);
+      return place(pose, [u * size_m, v * size_m, size_m]);
     });
-    const tip = to_board(pose, [0, 0, 0]);
+    const tip = place(pose, [0, 0, 0]);
     return corners.flatMap((corner, k) => [[tip, corner], [corner, corners[(k + 1) % 4]]]);
   };
 
@@ -145,9 +135,10 @@ if (closeups) {
       }
     };
 
-    const { points, pixels: sources } = cloud_of(shown);
+    const { points, pixels: sources, colours } = cloud_of(shown);
     const by_distance = document.querySelector("[name=space-colour]:checked").value === "distance";
     const rgba = shown.rgba;
+    const side = facing(shown);
     // Points grow as they come nearer, so that a surface stays closed.
     const footprint = (shown.step * focal) / scene.size_px[0] * 1.3;
     for (let i = 0; i < sources.length; i++) {
@@ -157,11 +148,10 @@ if (closeups) {
       const source = sources[i];
       let colour = 0xff888888;
       if (by_distance) {
-        const at = ((Math.max(-1, Math.min(z / RANGE_M, 1)) + 1) / 2) * (RAMP.length - 1);
-        const k = Math.min(Math.floor(at), RAMP.length - 2);
-        colour = pack(RAMP[k].map((from, c) => Math.round(from + (at - k) * (RAMP[k + 1][c] - from))));
-      } else if (rgba) {
-        colour = pack([rgba[4 * source], rgba[4 * source + 1], rgba[4 * source + 2]]);
+        colour = pack(closeups.colour_of_distance(side * z));
+      } else if (rgba && colours[i] >= 0) {
+        const at = 4 * colours[i];
+        colour = pack([rgba[at], rgba[at + 1], rgba[at + 2]]);
       }
       const size = Math.max(1, Math.min(5, Math.round(footprint * shown.depth_m[source] * p[2])));
       dab(p[0], p[1], p[2], size, colour, i);
@@ -268,7 +258,7 @@ if (closeups) {
     const { points, pixels } = cloud_of(shown);
     const source = pixels[id];
     const [px, py] = [(source % shown.columns) * shown.step, Math.floor(source / shown.columns) * shown.step];
-    const off_mm = 1000 * points[3 * id + 2];
+    const off_mm = 1000 * points[3 * id + 2] * facing(shown);
     const side = off_mm < 0 ? "in front of" : "behind";
     const [left, top] = [event.clientX, event.clientY - 6];
     tip.show(
@@ -282,7 +272,10 @@ if (closeups) {
     words.textContent = `Frame ${shown.frame}, ${scene.states[state].label}. ${shown.words[state]}`;
   };
   document.getElementById("space").addEventListener("change", (event) => {
-    if (event.target.name === "space-state") state = Number(event.target.value);
+    if (event.target.name === "space-state") {
+      state = Number(event.target.value);
+      closeups.see(state);
+    }
     if (event.target.name === "space-colour") {
       document.getElementById("space-scale").hidden = event.target.value !== "distance";
     }
