@@ -120,7 +120,8 @@ fn a_simulated_fault_is_found_whatever_the_number_of_threads() {
     let (one, three) = (audit("1", "one").code(3), audit("3", "three").code(3));
     assert!(one.stdout == three.stdout, "same input, same bytes");
     // The page names its own folder in the commands that it shows.
-    let page = read(scratch.join("three/report.html")).replace("three/report.json", "one/report.json");
+    let page =
+        read(scratch.join("three/report.html")).replace("three/report.json", "one/report.json");
     assert!(read(scratch.join("one/report.html")) == page);
 
     let report = json(&one.stdout);
