@@ -2,7 +2,8 @@
 //!
 //! An [`Audit`](crate::audit::Audit) leaves in three forms that say the same. [`wire`] is the versioned form for
 //! programs, written by [`to_json`]; [`summary`] is what a person reads in ten seconds on a terminal, as lines of
-//! [`Span`]s with a [`Tone`] each ([`overview`]: several recordings beside each other); [`page`] is one HTML file with the verdicts first and the evidence behind them,
+//! [`Span`]s with a [`Tone`] each ([`overview`]: several recordings beside each other); [`page`] is one HTML file with
+//! the verdicts first and the evidence behind them,
 //! with the recording's [`Pictures`]: photos ([`Photo`]) with what the detector saw in them ([`Overlay`]), and a few
 //! frames with their depth ([`Closeup`]) to lay over each other and to turn in space.
 //! [`sheet_pdf`], [`sheet_svg`] and [`sheet_png`] are the printed target.

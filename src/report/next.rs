@@ -53,7 +53,8 @@ pub(super) fn next_steps(audit: &Audit, typed: &Typed) -> Vec<NextStep> {
         steps.push(step(
             "take the camera from a recording that moves round the board",
             format!(
-                "truedepth calibrate MOVING --json > camera.json && truedepth audit {recording} --calibration camera.json"
+                "truedepth calibrate MOVING --json > camera.json && \
+                 truedepth audit {recording} --calibration camera.json"
             ),
         ));
         if let Some(row) = other_side(audit) {

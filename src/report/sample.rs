@@ -69,7 +69,8 @@ pub(super) fn audit() -> Audit {
     }
 }
 
-/// As [`audit`], with all that an audit can have: the board's shape, the motion of the poses, depth over the whole board.
+/// As [`audit`], with all that an audit can have: the board's shape, the motion of the poses, depth over the whole
+/// board.
 pub(super) fn rich_audit() -> Audit {
     let mut audit = audit();
     let board = audit.board.clone();

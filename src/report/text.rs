@@ -187,8 +187,8 @@ fn to_do(text: &str, prose: usize) -> Vec<Line> {
         .collect()
 }
 
-/// What to type: each command on a line of its own below what it is good for, as in a script, so that even all of it can
-/// be copied.
+/// What to type: each command on a line of its own below what it is good for, as in a script, so that even all of it
+/// can be copied.
 fn next(steps: &[NextStep]) -> Vec<Line> {
     let mut lines = Vec::new();
     for (index, NextStep { to, command }) in steps.iter().enumerate() {
@@ -224,8 +224,8 @@ fn wrapped(text: &str, width: usize) -> Vec<String> {
     lines.into_iter().map(|line| line.replace('\u{a0}', " ")).collect()
 }
 
-/// Aligned columns: code, verdict, quantity, factory, measured, difference; where they do not fit, without the factory's,
-/// and where these do not fit either, a quantity's numbers stand below it.
+/// Aligned columns: code, verdict, quantity, factory, measured, difference; where they do not fit, without the
+/// factory's, and where these do not fit either, a quantity's numbers stand below it.
 fn table(rows: &[Row], width: usize) -> Vec<Line> {
     let header = words::HEADER.map(str::to_owned);
     let all: Vec<[String; 4]> = rows

@@ -131,7 +131,8 @@ fn sliders(browser: &Browser, pointer: Pointer) {
 fn distances(browser: &Browser, pointer: Pointer) {
     let depth = pixels(browser, "#over canvas");
     browser.click(pointer, "#over input[value=distance]");
-    let shown = "return [...document.querySelectorAll('#over .scale-of-colours')].map((e) => e.checkVisibility()).join()";
+    let shown = "const all = document.querySelectorAll('#over .scale-of-colours');
+                 return [...all].map((e) => e.checkVisibility()).join()";
     assert_eq!(browser.script(shown), "false,true");
     let before = pixels(browser, "#over canvas");
     assert_ne!(before, depth);
@@ -163,7 +164,8 @@ fn focus_is_visible(browser: &Browser) {
         browser.keys(&[TAB]);
         let focused = browser.script(
             "const e = document.activeElement; const s = getComputedStyle(e);
-             return [s.outlineStyle !== 'none' && parseFloat(s.outlineWidth) >= 2, e.tagName + ' ' + e.className].join('|')",
+             const seen = s.outlineStyle !== 'none' && parseFloat(s.outlineWidth) >= 2;
+             return [seen, e.tagName + ' ' + e.className].join('|')",
         );
         let focused = focused.as_str().expect("a text").to_owned();
         assert!(focused.starts_with("true|"), "nobody sees the focus on {focused}");

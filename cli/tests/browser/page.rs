@@ -58,9 +58,12 @@ fn assert_figures(browser: &Browser, absent: &[&str]) {
 
 /// Nothing is cut off at the side of a phone, and everything that can be pressed can be hit by a finger.
 fn assert_fits(browser: &Browser) {
-    let wide =
-        browser.script("return [document.documentElement.scrollWidth, innerWidth].join(' of ')");
-    let fits = browser.script("return document.documentElement.scrollWidth <= innerWidth");
+    // Not innerWidth: a phone grows that with what is too wide.
+    let wide = browser.script(
+        "const e = document.documentElement; return [e.scrollWidth, e.clientWidth].join(' of ')",
+    );
+    let fits =
+        browser.script("const e = document.documentElement; return e.scrollWidth <= e.clientWidth");
     assert_eq!(fits, true, "the page is {wide} px wide");
 }
 
@@ -107,9 +110,7 @@ fn assert_accessible(browser: &Browser) {
     let wrong = browser.script(
         r"
         const wrong = [];
-        const name = (e) => (e.getAttribute('aria-label') ?? '').trim() || e.textContent.trim() ||
-          (e.getAttribute('aria-labelledby') ?? '').split(' ').map((id) => document.getElementById(id)?.textContent ?? '')
-            .join(' ').trim();
+        const name = (e) => (e.getAttribute('aria-label') ?? '').trim() || e.textContent.trim();
         const show = (e) => `${e.tagName} ${e.id} ${e.outerHTML.slice(0, 90)}`;
         for (const e of document.querySelectorAll('img')) if (!e.alt.trim()) wrong.push('no alt: ' + show(e));
         for (const e of document.querySelectorAll('[role=img]')) {
@@ -117,7 +118,9 @@ fn assert_accessible(browser: &Browser) {
           const words = labelled ? document.getElementById(labelled)?.textContent : e.getAttribute('aria-label');
           if (!words?.trim()) wrong.push('no name: ' + show(e));
         }
-        for (const e of document.querySelectorAll('button, a, summary')) if (!name(e)) wrong.push('no name: ' + show(e));
+        for (const e of document.querySelectorAll('button, a, summary')) {
+          if (!name(e)) wrong.push('no name: ' + show(e));
+        }
         for (const e of document.querySelectorAll('input')) {
           if (!(e.labels.length > 0 && e.labels[0].textContent.trim()) && !e.getAttribute('aria-label')) {
             wrong.push('no label: ' + show(e));
@@ -136,7 +139,9 @@ fn assert_accessible(browser: &Browser) {
           if (own > level + 1) wrong.push('a heading is skipped before ' + show(e));
           level = own;
         }
-        for (const e of document.querySelectorAll('.chip')) if (!e.textContent.trim()) wrong.push('colour only: ' + show(e));
+        for (const e of document.querySelectorAll('.chip')) {
+          if (!e.textContent.trim()) wrong.push('colour only: ' + show(e));
+        }
         // Far from zero a cell says so by its sign or its number.
         for (const figure of document.querySelectorAll('.figure:has(.heat)')) {
           const strong = figure.querySelectorAll(':is(.p2, .p3, .p4, .m2, .m3, .m4).mark').length;
@@ -150,27 +155,74 @@ fn assert_accessible(browser: &Browser) {
     assert_eq!(wrong, "");
 }
 
+/// All that can be asked of a page on a device.
+fn check(browser: &Browser, page: &Path, [device, scheme]: [&str; 2], absent: &[&str]) {
+    browser.media(scheme, "screen");
+    let (width, height, pointer) = match device {
+        "phone" => (390, 844, Pointer::Touch),
+        _ => (1280, 900, Pointer::Mouse),
+    };
+    browser.window(width, height, pointer);
+    browser.open(page);
+    browser.wait_for("document.querySelector('#space-view')?.dataset.points > 0");
+    assert_fits(browser);
+    assert_figures(browser, absent);
+    assert_contrast(browser, scheme);
+    assert_accessible(browser);
+    assert_quiet(browser);
+}
+
 /// At phone and desktop width, light and dark, and on paper.
-fn look(browser: &Browser, page: &Path, name: &str, schemes: &[[&str; 2]], absent: &[&str]) {
-    for [device, scheme] in schemes {
-        browser.media(scheme, "screen");
-        let (width, height, pointer) = match *device {
-            "phone" => (390, 844, Pointer::Touch),
-            _ => (1280, 900, Pointer::Mouse),
-        };
-        browser.window(width, height, pointer);
-        browser.open(page);
-        browser.wait_for("document.querySelector('#space-view')?.dataset.points > 0");
-        assert_fits(browser);
-        assert_figures(browser, absent);
-        assert_contrast(browser, scheme);
-        assert_accessible(browser);
-        assert_quiet(browser);
+fn look(browser: &Browser, page: &Path, name: &str, ways: &[[&str; 2]], absent: &[&str]) {
+    for &[device, scheme] in ways {
+        check(browser, page, [device, scheme], absent);
         browser.screenshot(&folder().join(format!("{name}-{device}-{scheme}.png")));
     }
     browser.media("light", "print");
     browser.window(794, 1123, Pointer::Mouse); // A4 at 96 dpi
     browser.screenshot(&folder().join(format!("{name}-print.png")));
+}
+
+/// What may go wrong with a page: a name, what is replaced, by what.
+const BREAKAGES: [(&str, &str, &str); 10] = [
+    ("a script that fails", "\"use strict\";", "\"use strict\"; throw new Error('broken');"),
+    (
+        "an image from elsewhere",
+        "<main>",
+        "<main><img alt=\"x\" src=\"https://example.com/x.png\">",
+    ),
+    ("a figure that is missing", "<figure id=\"coverage\"", "<figure id=\"gone\""),
+    ("a figure without marks", "class=\"mark part\"", "class=\"part\""),
+    ("faint letters", "--ink-2: light-dark(#5a5f68,", "--ink-2: light-dark(#b0b4ba,"),
+    ("an image without words", " alt=\"Colour image", " data-alt=\"Colour image"),
+    ("a slider without a name", " aria-label=\"How much of the picture shows depth, percent\"", ""),
+    ("a name that leads nowhere", "id=\"space-title\"", "id=\"other-title\""),
+    ("meaning by colour alone", "class=\"sign\"", "class=\"gone\""),
+    ("a page wider than the phone", "</style>", "main { min-width: 60rem; }</style>"),
+];
+
+/// The checks see what they are there to see.
+#[test]
+fn what_is_broken_is_seen() {
+    let Some(browser) = browser() else { return };
+    let page = simulated_report("broken");
+    let whole = std::fs::read_to_string(&page).expect("it was written");
+    let copy = page.with_file_name("broken.html");
+    let passes = |html: &str| {
+        std::fs::write(&copy, html).expect("the folder can be written");
+        // What an earlier page said is not this one's.
+        (browser.console(), browser.requests());
+        std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+            check(&browser, &copy, ["phone", "light"], &NOT_SIMULATED);
+        }))
+        .is_ok()
+    };
+    assert!(passes(&whole), "the whole page");
+    for (name, from, to) in BREAKAGES {
+        let broken = whole.replace(from, to);
+        assert_ne!(broken, whole, "{name}: nothing to break");
+        assert!(!passes(&broken), "nobody saw {name}");
+    }
 }
 
 #[test]

@@ -99,8 +99,9 @@ pub(in crate::report) fn image_coverage(audit: &Audit) -> Option<Figure> {
         rect class="image-frame" x="0.5" y="0.5" width=(n(WIDTH - 1.0)) height=(n(drawn_height - 1.0)) {}
         path class="cloud strong" d=(dots) {}
         @for (x, y, name, corners) in &parts {
-            rect class=(if *corners == 0 { "mark part empty" } else { "mark part" }) x=(n(*x)) y=(n(*y)) width=(n(width))
-                height=(n(height)) data-tip=(format!("{name}: {}", count(*corners, "corner"))) {}
+            @let class = if *corners == 0 { "mark part empty" } else { "mark part" };
+            rect class=(class) x=(n(*x)) y=(n(*y)) width=(n(width)) height=(n(height))
+                data-tip=(format!("{name}: {}", count(*corners, "corner"))) {}
             text class="halo" x=(n(x + 0.5 * width)) y=(n(y + 0.5 * height)) text-anchor="middle"
                 dominant-baseline="central" { (corners) }
         }

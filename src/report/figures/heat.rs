@@ -68,9 +68,10 @@ impl Heat {
 
     /// The cells; those without a finite number are left out.
     pub(super) fn tiles(&self, tiles: &[Tile]) -> Markup {
+        let known = tiles.iter().filter(|tile| tile.value.is_finite());
         html! {
             g class="heat" {
-                @for Tile { area: [x, y, width, height], value, label, tip } in tiles.iter().filter(|t| t.value.is_finite()) {
+                @for Tile { area: [x, y, width, height], value, label, tip } in known {
                     rect class=(format!("mark {}", self.class(*value))) x=(n(*x)) y=(n(*y)) width=(n(*width))
                         height=(n(*height)) data-tip=(tip) {}
                     @let (cx, cy) = (x + 0.5 * width, y + 0.5 * height);
@@ -133,7 +134,8 @@ impl Heat {
     }
 }
 
-/// The least number of a fine set of round ones that is not below `reach`: shades must not be spent on what is not there.
+/// The least number of a fine set of round ones that is not below `reach`: shades must not be spent on what is not
+/// there.
 fn round_reach(reach: f64) -> f64 {
     if !(reach.is_finite() && reach > 0.0) {
         return 1.0;
