@@ -211,7 +211,8 @@ fn what_is_broken_is_seen() {
     let passes = |html: &str| {
         std::fs::write(&copy, html).expect("the folder can be written");
         // What an earlier page said is not this one's.
-        (browser.console(), browser.requests());
+        browser.console();
+        browser.requests();
         std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
             check(&browser, &copy, ["phone", "light"], &NOT_SIMULATED);
         }))
