@@ -275,8 +275,8 @@ pub(in crate::report) fn noise_map(audit: &Audit) -> Option<Figure> {
         title: "Noise of the depth over the image".to_owned(),
         caption: format!(
             "How far single pixels scatter about small planes on the board: {} mm in the middle of all, at {} mm \
-             distance. It grows with distance and slant; a dark place that stays dark is dirt on the glass, or light \
-             from outside.",
+             distance. It grows with distance and slant; a place of its own that is strongly shaded is dirt on the \
+             glass, or light from outside.",
             plain(overall, 2),
             plain(1e3 * distance_m, 0),
         ),

@@ -73,8 +73,8 @@ pub(in crate::report) fn projection_uncertainty(audit: &Audit) -> Option<Figure>
         title: "How sure the camera is, over the image".to_owned(),
         caption: format!(
             "One standard deviation of where the own camera draws a point {} mm away, in its worst direction: {} px at \
-             best, {} px at worst. It grows where no corner was seen; a place that is dark here is not to be measured \
-             at. What the camera model cannot know is not in it: see the held-out marks above.",
+             best, {} px at worst. It grows where no corner was seen; do not measure where the shade is strong. \
+             What the camera model cannot know is not in it: see the held-out marks above.",
             plain(1e3 * depth_m, 0),
             plain(least, decimals),
             plain(most, decimals),
