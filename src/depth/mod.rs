@@ -38,6 +38,7 @@
 
 mod against_board;
 mod handedness;
+mod imprint;
 mod patch;
 mod pattern;
 mod rays;
@@ -47,6 +48,7 @@ mod stance;
 
 pub(crate) use against_board::corner_on;
 pub use against_board::{BoardDepth, FrameDepth, MAX_ERROR_M, Sample, against_board, sense};
+pub use imprint::{Imprint, Texture};
 pub use handedness::{CornerDepth, Handedness, handedness};
 pub use patch::{DepthSteps, Patch, Patches, patches};
 pub use pattern::{Holes, MAX_INCIDENCE_DEG, NEAR_M, Pattern, PatternCell};

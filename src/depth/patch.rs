@@ -1,6 +1,6 @@
 //! The board's whole surface in a depth map, reduced to some hundred patches.
 
-use super::CornerDepth;
+use super::{CornerDepth, Texture};
 use crate::{
     board::CharucoBoard,
     detect::Corner,
@@ -60,6 +60,8 @@ pub struct Patches {
     pub steps: Option<DepthSteps>,
     /// Depth at the corners, straight and mirrored, by ascending id.
     pub corners: Vec<CornerDepth>,
+    /// What is rough: the print, faintly.
+    pub texture: Texture,
 }
 
 /// So many patches would fill the outline: enough to see the sensor's patterns, few enough to keep for every frame.
@@ -126,6 +128,7 @@ pub fn patches(map: &DepthMap, board: &CharucoBoard, corners: &[Corner]) -> Opti
         torn: Vec::new(),
         steps: None,
         corners: corners.iter().map(read).collect(),
+        texture: Texture::new(map, [left, top], [width, height]),
     };
     let mut levels_m = Vec::new();
     let mut samples = Vec::with_capacity(side_px * side_px);

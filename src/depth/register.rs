@@ -1,9 +1,10 @@
 //! Depth against colour, all views at once: scale, bias, zoom and shift of the sensor.
 
-use nalgebra::{Cholesky, Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{Cholesky, Matrix2, Matrix3, SMatrix, SVector, Vector3};
 
 use super::{
     Patch, Patches,
+    imprint::{self, Imprint, Place, Print, Spot, Texture},
     pattern::{Holes, MAX_INCIDENCE_DEG, NEAR_M, Pattern, Residual},
     rays::RayGrid,
     relief::Relief,
@@ -165,6 +166,18 @@ pub fn register(input: &RegisterInput<'_>) -> Option<Registration> {
         }
     }
     let (planes, step) = found?;
+    let start = Place { center: scene.center, zoom: theta[2], shift_px: [theta[3], theta[4]] };
+    let textures: Vec<&Texture> = frames.iter().map(|(_, patches)| &patches.texture).collect();
+    let seen = imprint::find(&Print::new(board), start, &textures, |frame, place, at| {
+        let at_place = Numbers::from([1.0, 0.0, place.zoom, place.shift_px[0], place.shift_px[1]]);
+        scene.spot(frames[frame].0, scene.looked_at(at, &at_place))
+    });
+    if std::env::var("TD_DEBUG").is_ok() {
+        eprintln!("geom {theta:?} {:?}", step.covariance.diagonal().map(f64::sqrt));
+        if let Some(i) = seen {
+            eprintln!("print {:?} ± {:?} contrast {} ± {} n {}", i.place, [0,1,2].map(|k| i.covariance[k][k].sqrt()), i.contrast_m, i.contrast_sigma_m, i.n_frames);
+        }
+    }
     Some(assemble(input, &scene, &frames, &theta, &planes, &step))
 }
 
@@ -256,6 +269,22 @@ impl Scene<'_> {
                 -scale * zoom * slope[1],
             ]),
         })
+    }
+
+    /// Where on the board a pixel of the colour image looks; `None` beside it.
+    fn spot(&self, stance: &Stance, pixel: Pixel) -> Option<Spot> {
+        let (ray, by) = self.rays.at(pixel)?;
+        let depth_m = self.board_depth(stance, ray)?;
+        let to_board = stance.color_from_board.rotation.inverse();
+        let ray = Vector3::new(ray[0], ray[1], 1.0);
+        let on_board = to_board * (ray * depth_m - stance.color_from_board.translation);
+        // X = Z·ray, and Z = 1/(m·ray) but for the board's heights.
+        let by_pixel = by.map(|[dx, dy]| {
+            let d = Vector3::new(dx, dy, 0.0);
+            (to_board * (d * depth_m - ray * (depth_m * depth_m * stance.plane.dot(&d)))).xy()
+        });
+        let by_pixel = Matrix2::from_columns(&by_pixel);
+        Some(Spot { on_board_m: on_board.xy(), by_pixel, depth_m })
     }
 
     /// How the model's depth changes by one σ of each of the camera's numbers, poses standing still, metres.
