@@ -4,6 +4,7 @@ use nalgebra::{Matrix2, Matrix3, Matrix4, Vector2, Vector3, Vector4};
 
 use crate::{
     board::{CharucoBoard, Layout},
+    calibrate::Estimate,
     geom::Pixel,
     image::DepthMap,
     solve::mad_sigma,
@@ -11,26 +12,36 @@ use crate::{
 
 /// What the print in the depth maps says of where they lie on the colour images.
 ///
-/// Structured light measures white paper a little nearer than black ink: one to two tenths of a millimetre in the
-/// published recordings. The depth map so shows the chessboard, faintly, and where it shows it is where it lies,
-/// whatever poses, heights and the sensor's slow errors are.
+/// Structured light measures white paper a little nearer than black ink: by a tenth of a millimetre in the published
+/// recordings. The depth map so shows the chessboard, faintly, and where it shows it is where it lies, whatever the
+/// sensor's slow errors and the board's heights are.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Imprint {
-    /// Zoom, shift x and y (px), as in [`Registration`](super::Registration).
-    pub place: [f64; 3],
-    /// Their covariance: leaving out each frame in turn.
+    /// As in [`Registration`](super::Registration).
+    pub zoom: Estimate,
+    /// As in [`Registration`](super::Registration), pixels.
+    pub shift_px: [Estimate; 2],
+    /// Of zoom, shift x and shift y (px): leaving out each frame in turn, and what the size of the neighbourhood
+    /// changes.
     pub covariance: [[f64; 3]; 3],
-    /// How much nearer white is measured than black, metres.
-    pub contrast_m: f64,
-    /// Its standard deviation, metres.
-    pub contrast_sigma_m: f64,
+    /// How much nearer white is measured than black, as the sensor blurs it, metres.
+    pub contrast_m: Estimate,
     /// Frames that took part.
     pub n_frames: usize,
 }
 
+/// What the choice of the neighbourhood moves zoom and shift (px) by: on the published recordings, 25 or 65 pixels
+/// instead of 45 change them by so much, in no one direction. Leaving out frames does not tell of it.
+const NEIGHBOURHOOD_SIGMA: [f64; 3] = [0.0015, 0.25, 0.25];
+
 /// The print's contrast must stand out of the noise by so much; the place is a ratio to it, biased and skewed where it
 /// does not (by 1/this² of itself).
 const LEAST_CONTRAST: f64 = 7.0;
+/// Steps towards the place; from a few pixels away three are enough.
+const MAX_STEPS: usize = 8;
+/// Steps below these are the last: a tenth of the best σ.
+const SMALL_STEP_PX: f64 = 0.02;
+const SMALL_STEP_ZOOM: f64 = 1e-4;
 /// Fewer frames tell no σ.
 const LEAST_FRAMES: usize = 5;
 /// A frame with fewer cells says nothing.
@@ -46,6 +57,8 @@ const TUKEY: f64 = 4.685;
 pub(super) struct Print {
     /// Raster cells per metre.
     per_m: f64,
+    /// Paper round the board, metres.
+    margin_m: f64,
     columns: usize,
     rows: usize,
     /// (σ in metres, darkness −½ to ½), by σ.
@@ -57,9 +70,11 @@ impl Print {
         // Markers have 6 to 10 cells; blurred as the sensor does it, 16 cells a square show all that is left.
         let per_square = if board.squares_x.max(board.squares_y) > 40 { 8 } else { 16 };
         let per_m = per_square as f64 / board.square_m;
-        let (columns, rows) = (board.squares_x * per_square, board.squares_y * per_square);
+        // A square of paper all round: the sensor blurs the margin into the board's rim.
+        let [columns, rows] =
+            [board.squares_x, board.squares_y].map(|squares| (squares + 2) * per_square);
         let layout = board.layout.unwrap_or(Layout::New);
-        let at = |i: usize| (i as f64 + 0.5) / per_m;
+        let at = |i: usize| (i as f64 + 0.5) / per_m - board.square_m;
         let mut raster: Vec<f32> = (0..columns * rows)
             .map(|i| match board.is_white_at(layout, at(i % columns), at(i / columns)) {
                 Some(false) => 0.5,
@@ -76,12 +91,12 @@ impl Print {
             have = want;
             want *= std::f64::consts::SQRT_2;
         }
-        Self { per_m, columns, rows, levels }
+        Self { per_m, margin_m: board.square_m, columns, rows, levels }
     }
 
     /// Darkness and its derivative (per metre) at a place, at the level nearest to this blur; `None` beside the board.
     fn at(&self, level: &[f32], at_m: &Vector2<f64>) -> Option<(f64, Vector2<f64>)> {
-        let (x, y) = (at_m.x * self.per_m - 0.5, at_m.y * self.per_m - 0.5);
+        let [x, y] = [at_m.x, at_m.y].map(|m| (m + self.margin_m) * self.per_m - 0.5);
         if !(x >= 0.0 && y >= 0.0) {
             return None;
         }
@@ -148,6 +163,11 @@ const NOTHING: i16 = i16::MIN;
 const CELLS_ACROSS: usize = 128;
 
 impl Texture {
+    /// Of a depth map without measurement.
+    pub fn nothing() -> Self {
+        Self { cell_px: 1, first: [0; 2], columns: 0, rough: Vec::new() }
+    }
+
     /// Of the part of the map from `low` to `high` (exclusive), pixels.
     pub(super) fn new(map: &DepthMap, low: [usize; 2], high: [usize; 2]) -> Self {
         let cell_px = (map.width() / CELLS_ACROSS).max(2);
@@ -379,14 +399,18 @@ pub(super) fn find(
 ) -> Option<Imprint> {
     let mut place = start;
     let mut normals: Vec<Normal> = Vec::new();
-    for _ in 0..5 {
-        normals = textures
-            .iter()
-            .enumerate()
-            .filter_map(|(i, texture)| {
-                Normal::new(print, texture, &place, |pixel| look(i, &place, pixel))
-            })
-            .collect();
+    for _ in 0..MAX_STEPS {
+        let one =
+            |i: usize| Normal::new(print, textures[i], &place, |pixel| look(i, &place, pixel));
+        // Collected in order of frames, whatever the threads did.
+        #[cfg(feature = "parallel")]
+        let each: Vec<Option<Normal>> = {
+            use rayon::prelude::{IntoParallelIterator, ParallelIterator};
+            (0..textures.len()).into_par_iter().map(one).collect()
+        };
+        #[cfg(not(feature = "parallel"))]
+        let each: Vec<Option<Normal>> = (0..textures.len()).map(one).collect();
+        normals = each.into_iter().flatten().collect();
         let (information, score) = total(&normals);
         let (_, off) = solve(&information, &score)?;
         // A step longer than an edge is wide would leave what is linear.
@@ -394,6 +418,9 @@ pub(super) fn find(
         place.zoom += off.x / longest;
         place.shift_px[0] += off.y / longest;
         place.shift_px[1] += off.z / longest;
+        if off.y.hypot(off.z) < SMALL_STEP_PX && off.x.abs() < SMALL_STEP_ZOOM {
+            break;
+        }
     }
     let n = normals.len();
     if n < LEAST_FRAMES {
@@ -410,15 +437,19 @@ pub(super) fn find(
         covariance.ger(share, &change, &change, 1.0);
         variance += share * (without - contrast_m).powi(2);
     }
-    let contrast_sigma_m = variance.sqrt();
-    if !(contrast_m.abs() > LEAST_CONTRAST * contrast_sigma_m) {
+    let contrast_m = Estimate { value: contrast_m, sigma: variance.sqrt() };
+    if !(contrast_m.value.abs() > LEAST_CONTRAST * contrast_m.sigma) {
         return None;
     }
+    for (k, sigma) in NEIGHBOURHOOD_SIGMA.into_iter().enumerate() {
+        covariance[(k, k)] += sigma * sigma;
+    }
+    let estimate = |k: usize, value: f64| Estimate { value, sigma: covariance[(k, k)].sqrt() };
     Some(Imprint {
-        place: [place.zoom, place.shift_px[0], place.shift_px[1]],
+        zoom: estimate(0, place.zoom),
+        shift_px: [1, 2].map(|k| estimate(k, place.shift_px[k - 1])),
         covariance: std::array::from_fn(|i| std::array::from_fn(|j| covariance[(i, j)])),
         contrast_m,
-        contrast_sigma_m,
         n_frames: n,
     })
 }
@@ -427,4 +458,119 @@ fn total(normals: &[Normal]) -> (Matrix4<f64>, Vector4<f64>) {
     normals.iter().fold((Matrix4::zeros(), Vector4::zeros()), |(information, score), normal| {
         (information + normal.information, score + normal.score)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Rotation2;
+
+    use super::*;
+
+    const CENTER: Pixel = Pixel { x: 319.5, y: 239.5 };
+
+    /// A board straight before a pinhole, 0.5 mm to the pixel, its middle at the image's, turned a little more in each
+    /// frame: edges along the rows of pixels would fall between the same cells everywhere.
+    fn spot(frame: usize, pixel: Pixel) -> Spot {
+        let turn = Rotation2::new(0.11 + 0.23 * frame as f64);
+        let middle = Vector2::new(10.0, 8.0) * (0.5 * 0.020875);
+        let from = Vector2::new(pixel.x - CENTER.x, pixel.y - CENTER.y) * 0.0005;
+        Spot {
+            on_board_m: middle + turn * from,
+            by_pixel: turn.into_inner() * 0.0005,
+            depth_m: 0.25,
+        }
+    }
+
+    fn place(zoom: f64, shift_px: [f64; 2]) -> Place {
+        Place { center: CENTER, zoom, shift_px }
+    }
+
+    fn looked_at(place: &Place, at: Pixel) -> Pixel {
+        let from = place.from_center(at);
+        Pixel::new(CENTER.x + place.zoom * from.x, CENTER.y + place.zoom * from.y)
+    }
+
+    /// Normal numbers, always the same ones.
+    struct Noise(u64);
+
+    impl Noise {
+        fn normal(&mut self) -> f64 {
+            let mut uniform = || {
+                self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                (self.0 >> 11) as f64 / (1u64 << 53) as f64
+            };
+            (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+        }
+    }
+
+    /// A depth map with the print in it, that lies at this place; noise of 0.3 mm.
+    fn map(
+        board: &CharucoBoard,
+        (truth, contrast_m): (&Place, f64),
+        frame: usize,
+        noise: &mut Noise,
+    ) -> DepthMap {
+        let mut depth = |i: usize| {
+            let at = Pixel::new((i % 640) as f64, (i / 640) as f64);
+            let on = spot(frame, looked_at(truth, at)).on_board_m;
+            let dark = match board.is_white_at(Layout::Legacy, on.x, on.y) {
+                Some(false) => 0.5,
+                _ => -0.5,
+            };
+            (0.25 + contrast_m * dark + 0.0003 * noise.normal()) as f32
+        };
+        DepthMap::new(640, 480, (0..640 * 480).map(&mut depth).collect())
+    }
+
+    fn found(truth: &Place, contrast_m: f64) -> Option<Imprint> {
+        let mut board = CharucoBoard::paper(0.020875).expect("a board");
+        board.layout = Some(Layout::Legacy);
+        let mut noise = Noise(3);
+        let textures: Vec<Texture> = (0..6)
+            .map(|frame| {
+                let map = map(&board, (truth, contrast_m), frame, &mut noise);
+                Texture::new(&map, [0, 0], [640, 480])
+            })
+            .collect();
+        let textures: Vec<&Texture> = textures.iter().collect();
+        find(&Print::new(&board), place(1.0, [0.0; 2]), &textures, |frame, place, at| {
+            Some(spot(frame, looked_at(place, at)))
+        })
+    }
+
+    /// From where it is looked for, six pixels at the board's rim.
+    #[test]
+    fn the_print_tells_zoom_and_shift() {
+        let truth = place(0.98, [2.4, -1.7]);
+        for contrast_m in [0.0003, -0.0003] {
+            let seen = found(&truth, contrast_m).expect("stands out");
+            assert_eq!(seen.n_frames, 6);
+            assert!((seen.zoom.value - 0.98).abs() < 5e-4, "{seen:?}");
+            for (axis, truth) in seen.shift_px.iter().zip(truth.shift_px) {
+                assert!((axis.value - truth).abs() < 0.06, "{seen:?}");
+                assert!(axis.sigma < 0.3, "{seen:?}");
+            }
+            assert!(seen.contrast_m.value * contrast_m > 0.0, "{seen:?}");
+        }
+    }
+
+    #[test]
+    fn without_contrast_it_says_nothing() {
+        assert_eq!(found(&place(1.0, [0.0; 2]), 0.0), None);
+    }
+
+    #[test]
+    fn a_plane_has_no_texture_and_holes_have_none_either() {
+        let depth = |i: usize| {
+            let (x, y) = ((i % 640) as f64, (i / 640) as f64);
+            let hole = (300.0..330.0).contains(&x) && (200.0..230.0).contains(&y);
+            if hole { f32::NAN } else { (4.0 + 0.002 * x - 0.001 * y).recip() as f32 }
+        };
+        let map = DepthMap::new(640, 480, (0..640 * 480).map(depth).collect());
+        let texture = Texture::new(&map, [100, 70], [540, 410]);
+        let measured: Vec<i16> = texture.rough.iter().copied().filter(|r| *r != NOTHING).collect();
+        assert!(measured.iter().all(|r| r.abs() <= 2), "{:?}", measured.iter().max());
+        // The frame of the neighbourhood, and the hole with what is next to it.
+        assert!((4000..5700).contains(&measured.len()), "{}", measured.len());
+    }
 }

@@ -48,8 +48,8 @@ mod stance;
 
 pub(crate) use against_board::corner_on;
 pub use against_board::{BoardDepth, FrameDepth, MAX_ERROR_M, Sample, against_board, sense};
-pub use imprint::{Imprint, Texture};
 pub use handedness::{CornerDepth, Handedness, handedness};
+pub use imprint::{Imprint, Texture};
 pub use patch::{DepthSteps, Patch, Patches, patches};
 pub use pattern::{Holes, MAX_INCIDENCE_DEG, NEAR_M, Pattern, PatternCell};
-pub use register::{RegisterInput, Registration, register};
+pub use register::{RegisterInput, Registration, Slopes, register};

@@ -50,8 +50,23 @@ pub struct Registration {
     pub frames: Vec<usize>,
     /// Patches of the depth maps on the board.
     pub n_patches: usize,
+    /// Zoom and shift by the slopes of tilted views alone.
+    pub slopes: Slopes,
+    /// Zoom and shift by the print in the depth maps alone; `None` where it does not stand out of the noise.
+    pub imprint: Option<Imprint>,
+    /// How far the two lie apart: χ² over its three degrees of freedom, 1 on average where their σ are right.
+    pub disagreement: Option<f64>,
     /// What is left: by frame, over the image, from pixel to pixel.
     pub pattern: Pattern,
+}
+
+/// Zoom and shift from how the depth of tilted views slopes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slopes {
+    /// As in [`Registration`].
+    pub zoom: Estimate,
+    /// As in [`Registration`], pixels.
+    pub shift_px: [Estimate; 2],
 }
 
 impl Registration {
@@ -168,17 +183,11 @@ pub fn register(input: &RegisterInput<'_>) -> Option<Registration> {
     let (planes, step) = found?;
     let start = Place { center: scene.center, zoom: theta[2], shift_px: [theta[3], theta[4]] };
     let textures: Vec<&Texture> = frames.iter().map(|(_, patches)| &patches.texture).collect();
-    let seen = imprint::find(&Print::new(board), start, &textures, |frame, place, at| {
+    let imprint = imprint::find(&Print::new(board), start, &textures, |frame, place, at| {
         let at_place = Numbers::from([1.0, 0.0, place.zoom, place.shift_px[0], place.shift_px[1]]);
         scene.spot(frames[frame].0, scene.looked_at(at, &at_place))
     });
-    if std::env::var("TD_DEBUG").is_ok() {
-        eprintln!("geom {theta:?} {:?}", step.covariance.diagonal().map(f64::sqrt));
-        if let Some(i) = seen {
-            eprintln!("print {:?} ± {:?} contrast {} ± {} n {}", i.place, [0,1,2].map(|k| i.covariance[k][k].sqrt()), i.contrast_m, i.contrast_sigma_m, i.n_frames);
-        }
-    }
-    Some(assemble(input, &scene, &frames, &theta, &planes, &step))
+    Some(assemble(input, &scene, &frames, &theta, (&planes, &step, imprint)))
 }
 
 struct Scene<'a> {
@@ -525,13 +534,34 @@ fn larger(model: Square, other: Option<Square>) -> Square {
     Square::from_fn(|i, j| model[(i, j)] * factor(i) * factor(j))
 }
 
+/// Both witnesses of zoom and shift together, weighted by their covariances. Where they lie farther apart than these
+/// say, σ of zoom and shift grow by as much (Birge's ratio).
+fn both(theta: &Numbers, covariance: &Square, imprint: &Imprint) -> (Numbers, Square, f64) {
+    let seen = SMatrix::<f64, 3, 3>::from_fn(|i, j| imprint.covariance[i][j]);
+    let place =
+        Vector3::new(imprint.zoom.value, imprint.shift_px[0].value, imprint.shift_px[1].value);
+    let apart = place - theta.fixed_rows::<3>(2);
+    let Some(inverse) = (seen + covariance.fixed_view::<3, 3>(2, 2)).try_inverse() else {
+        return (*theta, *covariance, 0.0);
+    };
+    let gain = covariance.fixed_columns::<3>(2) * inverse;
+    let together = theta + gain * apart;
+    let mut left = covariance - gain * covariance.fixed_rows::<3>(2);
+    let disagreement = apart.dot(&(inverse * apart)) / 3.0;
+    let ratio = disagreement.max(1.0).sqrt();
+    for k in 2..N {
+        left.row_mut(k).scale_mut(ratio);
+        left.column_mut(k).scale_mut(ratio);
+    }
+    (together, left, disagreement)
+}
+
 fn assemble(
     input: &RegisterInput<'_>,
     scene: &Scene<'_>,
     frames: &[(&Stance, &Patches)],
     theta: &Numbers,
-    planes: &[Plane],
-    step: &Step,
+    (planes, step, imprint): (&[Plane], &Step, Option<Imprint>),
 ) -> Registration {
     let mut covariance = step.covariance;
     if let Some(calibration) = input.calibration {
@@ -547,19 +577,33 @@ fn assemble(
             }
         }
     }
-    let estimate =
-        |k: usize| Estimate { value: theta[k], sigma: covariance[(k, k)].max(0.0).sqrt() };
+    let estimate = |theta: &Numbers, covariance: &Square, k: usize| Estimate {
+        value: theta[k],
+        sigma: covariance[(k, k)].max(0.0).sqrt(),
+    };
+    let slopes = Slopes {
+        zoom: estimate(theta, &covariance, 2),
+        shift_px: [3, 4].map(|k| estimate(theta, &covariance, k)),
+    };
+    let (theta, covariance, disagreement) = match &imprint {
+        Some(imprint) => {
+            let (theta, covariance, apart) = both(theta, &covariance, imprint);
+            (theta, covariance, Some(apart))
+        }
+        None => (*theta, covariance, None),
+    };
+    let estimate = |k: usize| estimate(&theta, &covariance, k);
     let n_patches = planes.iter().map(|p| p.n_patches).sum::<usize>();
     let mut frames_used: Vec<usize> = planes.iter().map(|p| p.frame).collect();
     frames_used.sort_unstable();
     let mut holes = Holes::default();
     let mut residuals = Vec::with_capacity(n_patches);
     for (stance, patches) in frames {
-        for (patch, sight) in scene.sights(stance, patches, theta) {
+        for (patch, sight) in scene.sights(stance, patches, &theta) {
             holes.add(
                 patch.n + patch.n_holes,
                 patch.n_holes,
-                scene.in_reach(stance, patch.at, theta),
+                scene.in_reach(stance, patch.at, &theta),
             );
             residuals.push(Residual {
                 frame: stance.frame,
@@ -569,9 +613,9 @@ fn assemble(
             });
         }
         for &(at, n_holes) in &patches.torn {
-            let seen = scene.rays.at(scene.looked_at(at, theta));
+            let seen = scene.rays.at(scene.looked_at(at, &theta));
             if seen.is_some_and(|(ray, _)| scene.board_depth(stance, ray).is_some()) {
-                holes.add(patches.side_px.pow(2), n_holes, scene.in_reach(stance, at, theta));
+                holes.add(patches.side_px.pow(2), n_holes, scene.in_reach(stance, at, &theta));
             }
         }
     }
@@ -588,6 +632,9 @@ fn assemble(
         ],
         n_frames: planes.len(),
         frames: frames_used,
+        slopes,
+        imprint,
+        disagreement,
         n_patches,
         pattern: Pattern::new(&input.camera.intrinsics, &residuals, holes),
     }

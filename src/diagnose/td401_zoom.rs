@@ -4,7 +4,7 @@ use super::{
     Case, Code, Correction, Evidence, Finding, Unit, Verdict, td201_focal_length::Measured,
     td301_depth_scale::basis,
 };
-use crate::calibrate::Estimate;
+use crate::{calibrate::Estimate, depth::Registration};
 
 /// What makes zoom and shift observable.
 pub(super) const RECORD: &str = "Record 20 or more frames with the board tilted by 20 to 45 degrees to all sides, at \
@@ -29,9 +29,12 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
     finding.sigma = Some(100.0 * deviation.sigma);
     finding.evidence = vec![
         Evidence::estimate("zoom", zoom),
-        Evidence::number("n_frames", found.n_frames as f64),
-        Evidence::number("n_patches", found.n_patches as f64),
+        Evidence::estimate("zoom_by_slopes", found.slopes.zoom),
     ];
+    if let Some(print) = &found.imprint {
+        finding.evidence.push(Evidence::estimate("zoom_by_print", print.zoom));
+    }
+    finding.evidence.extend(witnesses(found));
     let words = match finding.verdict {
         Verdict::Fault if deviation.value < 0.0 => {
             "The depth map shows only the middle of the colour image"
@@ -42,12 +45,10 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
         Verdict::Unknown | Verdict::Warning => "Cannot tell whether depth is zoomed against colour",
     };
     finding.summary = format!(
-        "{words}: {:.4} +- {:.4} of its width about the principal point (from the slopes of tilted views; {} patches \
-         in {} frames; tolerance {:.1} %).",
+        "{words}: {:.4} +- {:.4} of its width about the principal point ({}; tolerance {:.1} %).",
         zoom.value,
         zoom.sigma,
-        found.n_patches,
-        found.n_frames,
+        by_what(found),
         100.0 * case.tolerances.zoom,
     );
     match finding.verdict {
@@ -65,6 +66,35 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
         Verdict::Info | Verdict::Ok => {}
     }
     finding
+}
+
+/// What zoom and shift rest on, for the end of a sentence.
+pub(super) fn by_what(found: &Registration) -> String {
+    let slopes = format!(
+        "from the slopes of tilted views, {} patches in {} frames",
+        found.n_patches, found.n_frames
+    );
+    match &found.imprint {
+        Some(print) => format!(
+            "{slopes}, and from the print, which the depth maps of {} frames show by {:.2} mm",
+            print.n_frames,
+            1e3 * print.contrast_m.value.abs()
+        ),
+        None => slopes,
+    }
+}
+
+/// The same as numbers.
+pub(super) fn witnesses(found: &Registration) -> Vec<Evidence> {
+    let mut numbers = vec![
+        Evidence::number("n_frames", found.n_frames as f64),
+        Evidence::number("n_patches", found.n_patches as f64),
+    ];
+    if let Some((print, disagreement)) = found.imprint.as_ref().zip(found.disagreement) {
+        numbers.push(Evidence::estimate("print_contrast_m", print.contrast_m));
+        numbers.push(Evidence::number("disagreement", disagreement));
+    }
+    numbers
 }
 
 /// How far the zoom moves the image's edge, pixels.

@@ -1,8 +1,10 @@
 #![doc = include_str!("td402_shift.md")]
 
 use super::{
-    Case, Code, Correction, Evidence, Finding, Unit, Verdict, td201_focal_length::Measured,
-    td301_depth_scale::basis, td401_zoom::RECORD,
+    Case, Code, Correction, Evidence, Finding, Unit, Verdict,
+    td201_focal_length::Measured,
+    td301_depth_scale::basis,
+    td401_zoom::{RECORD, by_what, witnesses},
 };
 use crate::calibrate::Estimate;
 
@@ -28,9 +30,14 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
     finding.evidence = vec![
         Evidence::estimate("shift_x_px", x),
         Evidence::estimate("shift_y_px", y),
-        Evidence::number("n_frames", found.n_frames as f64),
-        Evidence::number("n_patches", found.n_patches as f64),
+        Evidence::estimate("shift_x_by_slopes_px", found.slopes.shift_px[0]),
+        Evidence::estimate("shift_y_by_slopes_px", found.slopes.shift_px[1]),
     ];
+    if let Some(print) = &found.imprint {
+        finding.evidence.push(Evidence::estimate("shift_x_by_print_px", print.shift_px[0]));
+        finding.evidence.push(Evidence::estimate("shift_y_by_print_px", print.shift_px[1]));
+    }
+    finding.evidence.extend(witnesses(found));
     let words = match finding.verdict {
         Verdict::Fault => "Depth lies beside its colour",
         Verdict::Info => "Depth lies on its colour within the tolerance, if not exactly",
@@ -40,9 +47,13 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
         }
     };
     finding.summary = format!(
-        "{words}: {:+.2} +- {:.2} px to the right, {:+.2} +- {:.2} px down (either axis judged by itself; {} patches \
-         in {} frames; tolerance {tolerance_px:.1} px).",
-        x.value, x.sigma, y.value, y.sigma, found.n_patches, found.n_frames,
+        "{words}: {:+.2} +- {:.2} px to the right, {:+.2} +- {:.2} px down (either axis judged by itself; {}; \
+         tolerance {tolerance_px:.1} px).",
+        x.value,
+        x.sigma,
+        y.value,
+        y.sigma,
+        by_what(found),
     );
     match finding.verdict {
         Verdict::Fault => {

@@ -11,7 +11,7 @@ use crate::{
     calibrate::{FrameCorners, Input, Method, Model, calibrate, distortion_test},
     camera::{Camera, Distortion, Intrinsics, RadialTable, TablePair},
     depth::{
-        BoardDepth, CornerDepth, DepthSteps, Patch, Patches, RegisterInput, against_board,
+        BoardDepth, CornerDepth, DepthSteps, Patch, Patches, RegisterInput, Texture, against_board,
         handedness, register,
     },
     detect::{Corner, Identity, Observation},
@@ -133,7 +133,14 @@ impl World {
                 CornerDepth { id: corner.id, straight_m, mirrored_m }
             })
             .collect();
-        Patches { side_px, measured, torn: Vec::new(), steps: Some(self.steps), corners }
+        Patches {
+            side_px,
+            measured,
+            torn: Vec::new(),
+            steps: Some(self.steps),
+            corners,
+            texture: Texture::nothing(),
+        }
     }
 
     fn judge(&self) -> (Vec<Finding>, DistortionState) {

@@ -247,6 +247,8 @@ pub(super) struct Seen {
     pub(super) cos_incidence: f64,
     /// Distance to the next step in depth, pixels.
     pub(super) edge_px: f64,
+    /// Position in the plane of the board, squares.
+    pub(super) square: [f64; 2],
 }
 
 impl<'a> Sight<'a> {
@@ -299,7 +301,7 @@ impl<'a> Sight<'a> {
         let m = &self.board_from_color;
         let towards = m[(2, 0)] * u + m[(2, 1)] * v + m[(2, 2)];
         let cos_incidence = towards / (u * u + v * v + 1.0).sqrt();
-        Some(Seen { depth_m: hit.depth_m, cos_incidence, edge_px })
+        Some(Seen { depth_m: hit.depth_m, cos_incidence, edge_px, square: hit.square })
     }
 
     fn plane(&self, u: f64, v: f64, height_m: f64) -> Option<Hit> {

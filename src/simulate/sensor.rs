@@ -1,8 +1,9 @@
 //! What the depth sensor makes of a scene.
 
 use super::{
+    print::PrintedPlane,
     random::{Random, Subject},
-    scene::{Scene, Sight},
+    scene::{Scene, Seen, Sight},
 };
 use crate::{geom::Pixel, image::DepthMap};
 
@@ -32,6 +33,11 @@ pub struct DepthSensor {
     pub edge_px: f64,
     /// Holes for no visible reason, per frame on average.
     pub blobs: f64,
+    /// How much farther black ink is measured than white paper, metres: TrueDepth shows the print of the published
+    /// boards by a tenth of a millimetre.
+    pub contrast_m: f64,
+    /// Standard deviation of the Gaussian that blurs it, pixels.
+    pub contrast_blur_px: f64,
     /// Columns at the left and right, rows at the top and bottom that the projector does not reach.
     pub border_px: [usize; 4],
     /// Depths are whole multiples of this, metres; 0 for none.
@@ -58,6 +64,8 @@ impl DepthSensor {
         max_incidence_rad: std::f64::consts::FRAC_PI_2,
         edge_px: 0.0,
         blobs: 0.0,
+        contrast_m: 0.0,
+        contrast_blur_px: 1.0,
         border_px: [0; 4],
         unit_m: 0.0,
         scale_excess: 0.0,
@@ -77,6 +85,8 @@ impl DepthSensor {
         max_incidence_rad: 1.31,
         edge_px: 1.5,
         blobs: 2.0,
+        contrast_m: 0.15e-3,
+        contrast_blur_px: 4.0,
         border_px: [4, 3, 0, 2],
         unit_m: 1e-4,
         ..Self::PERFECT
@@ -111,7 +121,7 @@ pub(super) fn measure_frame(
     let sight = Sight::new(scene);
     let min_cos = sensor.max_incidence_rad.cos();
     let [left, right, top, bottom] = sensor.border_px;
-    let depth_at = |x: usize, y: usize| -> Option<f64> {
+    let seen_at = |x: usize, y: usize| {
         if x < left || x + right >= width || y < top || y + bottom >= height {
             return None;
         }
@@ -120,7 +130,13 @@ pub(super) fn measure_frame(
         let window = |p: f64, shift: f64, c: f64| c + sensor.zoom * (p - shift - c);
         let at =
             Pixel::new(window(x as f64, dx, intrinsics.cx), window(y as f64, dy, intrinsics.cy));
-        let seen = sight.seen(at)?;
+        sight.seen(at)
+    };
+    let seen: Vec<Option<Seen>> =
+        (0..width * height).map(|i| seen_at(i % width, i / width)).collect();
+    let darkness = (sensor.contrast_m != 0.0).then(|| darkness(scene, sensor, width, &seen));
+    let depth_at = |x: usize, y: usize| -> Option<f64> {
+        let seen = seen[y * width + x]?;
         let frayed = || sensor.min_range_m * (1.0 + 0.04 * ragged.at(x, y));
         // Raggedness stays within ±5.2, the reach of its random numbers; most pixels need none.
         let too_near = seen.depth_m < 1.3 * sensor.min_range_m && seen.depth_m < frayed();
@@ -140,7 +156,11 @@ pub(super) fn measure_frame(
             return None;
         }
         let noise_m = sensor.noise_m(seen.depth_m) * noise.at(x, y);
-        let measured = seen.depth_m * (1.0 + sensor.scale_excess) + sensor.bias_m + noise_m;
+        let dark = darkness.as_ref().map_or(0.0, |d| f64::from(d[y * width + x]));
+        let measured = seen.depth_m * (1.0 + sensor.scale_excess)
+            + sensor.bias_m
+            + sensor.contrast_m * dark
+            + noise_m;
         let unit = sensor.unit_m;
         let stored = if unit > 0.0 { (measured / unit).round() * unit } else { measured };
         (stored > 0.0).then_some(stored)
@@ -149,6 +169,61 @@ pub(super) fn measure_frame(
         .map(|i| depth_at(i % width, i / width).map_or(f32::NAN, |z| z as f32))
         .collect();
     DepthMap::new(width, height, depth_m)
+}
+
+/// What is printed where each pixel looks, blurred: −½ for paper, ½ for ink.
+fn darkness(scene: &Scene, sensor: &DepthSensor, width: usize, seen: &[Option<Seen>]) -> Vec<f32> {
+    let print = &scene.print;
+    // The wall is taken for paper.
+    let plane = PrintedPlane::new(&scene.board, print, print.paper);
+    let dark = |seen: &Option<Seen>| {
+        let reflectance = seen.as_ref().map_or(print.paper, |seen| plane.at(seen.square));
+        ((print.paper - reflectance) / (print.paper - print.ink) - 0.5) as f32
+    };
+    let weights = gaussian(sensor.contrast_blur_px);
+    let sum: f32 = weights.iter().sum();
+    let radius = weights.len() / 2;
+    let height = seen.len() / width;
+    // The rim repeats beyond the map.
+    let (wide, high) = (width + 2 * radius, height + 2 * radius);
+    let inside = |i: usize, n: usize| i.saturating_sub(radius).min(n - 1);
+    let framed: Vec<f32> = (0..wide * high)
+        .map(|k| {
+            dark(&seen[inside(k / wide, height) * width + inside(k % wide, width)]) / (sum * sum)
+        })
+        .collect();
+    convolved(&framed, &weights, width, height)
+}
+
+/// A Gaussian of this standard deviation, sampled to three of them, 1 at its middle.
+fn gaussian(sigma_px: f64) -> Vec<f32> {
+    let radius = (3.0 * sigma_px).ceil() as usize;
+    (0..=2 * radius)
+        .map(|i| (i as f64 - radius as f64) / sigma_px.max(1e-9))
+        .map(|x| (-0.5 * x * x).exp() as f32)
+        .collect()
+}
+
+/// A map with a frame of half the weights' length all round, convolved along rows and columns; the frame is gone.
+fn convolved(framed: &[f32], weights: &[f32], width: usize, height: usize) -> Vec<f32> {
+    let wide = width + weights.len() - 1;
+    let mut across = vec![0.0f32; width * (height + weights.len() - 1)];
+    for (out, row) in across.chunks_mut(width).zip(framed.chunks(wide)) {
+        for (i, weight) in weights.iter().enumerate() {
+            for (out, value) in out.iter_mut().zip(&row[i..]) {
+                *out += weight * value;
+            }
+        }
+    }
+    let mut down = vec![0.0f32; width * height];
+    for (y, out) in down.chunks_mut(width).enumerate() {
+        for (i, weight) in weights.iter().enumerate() {
+            for (out, value) in out.iter_mut().zip(&across[(y + i) * width..]) {
+                *out += weight * value;
+            }
+        }
+    }
+    down
 }
 
 /// Round holes with ragged rims.
@@ -196,33 +271,13 @@ impl Noise {
 
 /// White noise convolved with a Gaussian, scaled to variance 1.
 fn correlated(sigma_px: f64, width: usize, height: usize, random: &mut Random) -> Vec<f32> {
-    let radius = (3.0 * sigma_px).ceil() as usize;
-    let weights: Vec<f64> = (0..=2 * radius)
-        .map(|i| (i as f64 - radius as f64) / sigma_px.max(1e-9))
-        .map(|x| (-0.5 * x * x).exp())
-        .collect();
-    let norm = weights.iter().map(|w| w * w).sum::<f64>().sqrt();
-    let weights: Vec<f32> = weights.iter().map(|w| (w / norm) as f32).collect();
-    // White noise reaches beyond the map by the radius, so that its rim is as noisy as its middle.
-    let (wide, high) = (width + 2 * radius, height + 2 * radius);
+    let weights = gaussian(sigma_px);
+    let norm = weights.iter().map(|w| w * w).sum::<f32>().sqrt();
+    let weights: Vec<f32> = weights.iter().map(|w| w / norm).collect();
+    // White noise reaches beyond the map by half the weights, so that its rim is as noisy as its middle.
+    let (wide, high) = (width + weights.len() - 1, height + weights.len() - 1);
     let white: Vec<f32> = (0..wide * high).map(|_| random.normal() as f32).collect();
-    let mut across = vec![0.0f32; width * high];
-    for (out, row) in across.chunks_mut(width).zip(white.chunks(wide)) {
-        for (i, weight) in weights.iter().enumerate() {
-            for (out, value) in out.iter_mut().zip(&row[i..]) {
-                *out += weight * value;
-            }
-        }
-    }
-    let mut down = vec![0.0f32; width * height];
-    for (y, out) in down.chunks_mut(width).enumerate() {
-        for (i, weight) in weights.iter().enumerate() {
-            for (out, value) in out.iter_mut().zip(&across[(y + i) * width..]) {
-                *out += weight * value;
-            }
-        }
-    }
-    down
+    convolved(&white, &weights, width, height)
 }
 
 /// Random numbers at the knots of a grid, interpolated bilinearly; variance 1 on average.

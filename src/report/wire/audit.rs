@@ -184,10 +184,41 @@ pub struct Alignment {
     pub shift_px: Option<[f64; 2]>,
     /// Standard deviations of `shift_px`.
     pub shift_sigma_px: Option<[f64; 2]>,
+    /// By the slopes of tilted views alone.
+    pub slopes: Option<Witness>,
+    /// By the print that the depth maps show faintly, alone; `null` where it does not stand out.
+    pub print: Option<PrintWitness>,
+    /// How far these two lie apart: chi-squared over its 3 degrees of freedom; beyond 1 the σ above are larger for it.
+    pub disagreement: Option<f64>,
     /// Whether the images show the board mirrored.
     pub mirrored: Option<bool>,
     /// Whether the depth maps are mirrored against the colour images.
     pub depth_mirrored: Option<bool>,
+}
+
+/// One way to tell where depth lies on colour.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Witness {
+    /// As in [`Alignment`].
+    pub zoom: f64,
+    /// Its standard deviation.
+    pub zoom_sigma: f64,
+    /// As in [`Alignment`].
+    pub shift_px: [f64; 2],
+    /// Their standard deviations.
+    pub shift_sigma_px: [f64; 2],
+}
+
+/// The print as a witness.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PrintWitness {
+    /// Where it lies.
+    #[serde(flatten)]
+    pub place: Witness,
+    /// How much nearer white is measured than black.
+    pub contrast_mm: f64,
+    /// Its standard deviation.
+    pub contrast_sigma_mm: f64,
 }
 
 /// One thing that was checked.
@@ -300,8 +331,26 @@ impl Alignment {
             zoom_sigma: found.and_then(|r| finite(r.zoom.sigma)),
             shift_px: shift(|e| e.value),
             shift_sigma_px: shift(|e| e.sigma),
+            slopes: found.map(|r| Witness::new(r.slopes.zoom, r.slopes.shift_px)),
+            print: found.and_then(|r| r.imprint.as_ref()).map(|imprint| PrintWitness {
+                place: Witness::new(imprint.zoom, imprint.shift_px),
+                contrast_mm: 1e3 * imprint.contrast_m.value,
+                contrast_sigma_mm: 1e3 * imprint.contrast_m.sigma,
+            }),
+            disagreement: found.and_then(|r| r.disagreement),
             mirrored: mirrored(&audit.frames),
             depth_mirrored: handedness.map(|h| h.n_mirrored > h.n_straight),
+        }
+    }
+}
+
+impl Witness {
+    fn new(zoom: Estimate, shift_px: [Estimate; 2]) -> Self {
+        Self {
+            zoom: zoom.value,
+            zoom_sigma: zoom.sigma,
+            shift_px: shift_px.map(|e| e.value),
+            shift_sigma_px: shift_px.map(|e| e.sigma),
         }
     }
 }

@@ -23,7 +23,7 @@ mod pictures;
 
 pub use audit::{
     Alignment, Audit, Board, CorrectionInfo, Depth, DepthNoise, DeviceInfo, EvidenceInfo,
-    FactoryInfo, FindingInfo, Frame, FrameDepthInfo, ResidualMap,
+    FactoryInfo, FindingInfo, Frame, FrameDepthInfo, PrintWitness, ResidualMap, Witness,
 };
 pub use calibration::{
     BoardSurface, Calibration, Candidate, Distortion, DistortionTest, Hypothesis, LeftOut, Outlier,
