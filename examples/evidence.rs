@@ -52,7 +52,8 @@ fn main() {
     fill(pages, "depth.md", &depth(&all));
     fs::write(pages.join("residual-maps.svg"), maps(&all)).expect("writes");
     let mut warped = String::from(
-        "| recording | depth maps | zoom | against as recorded | shift, px | TD401 |\n|---|---|---|---|---|---|\n",
+        "| recording | depth maps | zoom by slopes | by the print | both | against as recorded | shift by slopes, px | by the \
+         print | both | apart | TD401, TD402 |\n|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
     for ((name, title), (_, plain, _)) in RECORDINGS.iter().zip(&all) {
         let as_recorded = plain.registration.as_ref().expect("registers").zoom;
@@ -183,15 +184,24 @@ fn depth(all: &[(&str, Audit, Audit)]) -> String {
 
 fn row(out: &mut String, title: &str, what: &str, audit: &Audit, before: f64) {
     let r = audit.registration.as_ref().expect("registers");
-    let finding = audit.findings.iter().find(|f| f.code.name() == "TD401").expect("is checked");
+    let verdict = |code: &str| {
+        audit.findings.iter().find(|f| f.code.name() == code).expect("is checked").verdict.name()
+    };
+    let both = |[x, y]: [Estimate; 2]| format!("{}, {}", pm(x, 2), pm(y, 2));
+    let print = r.imprint.as_ref();
     writeln!(
         out,
-        "| {title} | {what} | {} | {:+.2} % | {}, {} | {} |",
+        "| {title} | {what} | {} | {} | {} | {:+.2} % | {} | {} | {} | {} | {}, {} |",
+        pm(r.slopes.zoom, 4),
+        print.map_or_else(String::new, |p| pm(p.zoom, 4)),
         pm(r.zoom, 4),
         100.0 * (r.zoom.value / before - 1.0),
-        pm(r.shift_px[0], 2),
-        pm(r.shift_px[1], 2),
-        finding.verdict.name()
+        both(r.slopes.shift_px),
+        print.map_or_else(String::new, |p| both(p.shift_px)),
+        both(r.shift_px),
+        r.disagreement.map_or_else(String::new, |d| format!("{d:.1}")),
+        verdict("TD401"),
+        verdict("TD402"),
     )
     .expect("a string grows");
 }

@@ -254,7 +254,7 @@ struct Sums<const N: usize> {
 
 impl<const N: usize> Sums<N> {
     fn new(columns: usize, cells: impl ExactSizeIterator<Item = Option<[f64; N]>>) -> Self {
-        let rows = if columns == 0 { 0 } else { cells.len() / columns };
+        let rows = cells.len().checked_div(columns).unwrap_or(0);
         let wide = columns + 1;
         let mut table = vec![([0.0; N], 0); wide * (rows + 1)];
         let mut row = ([0.0; N], 0);
@@ -337,7 +337,7 @@ impl Normal {
                 let spot = spots[k].as_ref()?;
                 let (darkness, by_board) = print.at(level, &spot.on_board_m)?;
                 let by_pixel = spot.by_pixel.transpose() * by_board;
-                let by_zoom = by_pixel.dot(&place.from_center(texture.at(k)));
+                let by_zoom = by_pixel.dot(&place.off_center(texture.at(k)));
                 let by_shift = -place.zoom * by_pixel;
                 let curvature = -1.0 / (spot.depth_m * spot.depth_m);
                 Some([darkness, by_zoom, by_shift.x, by_shift.y].map(|d| d * curvature))
@@ -377,7 +377,7 @@ pub(super) struct Place {
 }
 
 impl Place {
-    fn from_center(&self, at: Pixel) -> Vector2<f64> {
+    fn off_center(&self, at: Pixel) -> Vector2<f64> {
         let [dx, dy] = self.shift_px;
         Vector2::new(at.x - dx - self.center.x, at.y - dy - self.center.y)
     }
@@ -486,7 +486,7 @@ mod tests {
     }
 
     fn looked_at(place: &Place, at: Pixel) -> Pixel {
-        let from = place.from_center(at);
+        let from = place.off_center(at);
         Pixel::new(CENTER.x + place.zoom * from.x, CENTER.y + place.zoom * from.y)
     }
 

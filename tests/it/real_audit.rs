@@ -97,10 +97,15 @@ fn ipad_4th_generation_is_not_rectified() {
 #[test]
 fn iphone_has_no_focal_fault() {
     for method in [Method::Auto, Method::Paper] {
-        let Some(audit) = run(IPHONE, method) else { return };
-        // TD402 is open: see real_alignment.rs.
-        let found: Vec<Code> = faults(&audit).into_iter().filter(|c| *c != Code::TD402).collect();
-        assert_eq!(found, [Code::TD203], "{}", audit.method.name());
+        let Some(audit) = run(IPHONE, method.clone()) else { return };
+        // Depth lies 1.4 px beside colour: see real_alignment.rs. As the paper calibrates, without a lens, that is less
+        // sure.
+        let found = faults(&audit);
+        assert_eq!(found[0], Code::TD203, "{}", audit.method.name());
+        match method {
+            Method::Auto => assert_eq!(found[1..], [Code::TD402]),
+            _ => assert!(found[1..].iter().all(|code| *code == Code::TD402), "{found:?}"),
+        }
         let focal = finding(&audit, Code::TD201);
         // Half a percent off is significant with the board's shape estimated, and far from relevant.
         assert!(matches!(focal.verdict, Verdict::Ok | Verdict::Info), "{focal:?}");
