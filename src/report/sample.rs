@@ -12,7 +12,7 @@ use crate::{
         Hypothesis, Lens, Model, Outlier, Parameter, RejectedFrame, Rejection, SurfaceKind,
     },
     camera::{Camera, Distortion, Intrinsics},
-    depth::{Holes, Pattern, PatternCell, Registration, against_board, patches},
+    depth::{Holes, Pattern, PatternCell, Registration, Slopes, against_board, patches},
     detect::{Corner, Identity, Observation, Reason, Reject},
     diagnose::{
         Code, Correction, Device, DistortionState, Evidence, Finding, Sensor, Unit, Verdict,
@@ -127,6 +127,12 @@ pub(super) fn rich_audit() -> Audit {
         n_frames: 3,
         frames: vec![0, 1, 4],
         n_patches: 1200,
+        slopes: Slopes {
+            zoom: estimate(0.951, 0.002),
+            shift_px: [estimate(0.4, 0.6), estimate(-0.2, 0.6)],
+        },
+        imprint: None,
+        disagreement: None,
         pattern,
     });
     audit
