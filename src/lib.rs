@@ -67,6 +67,9 @@ pub mod simulate;
 // Corrections applied: a recording in, a true one out, with provenance.
 pub mod correct;
 
+// The paper's tables and figures, from its published data.
+pub mod reproduce;
+
 // What leaves the library: JSON, HTML, SVG.
 pub mod report;
 

@@ -10,7 +10,7 @@ use clap::{Parser, Subcommand, ValueEnum, builder::PossibleValuesParser};
 use correct::CORRECT_EXAMPLES;
 pub(crate) use correct::{CorrectArgs, SamplingChoice, Steps};
 use paper::{COMPARE_EXAMPLES, INSPECT_EXAMPLES};
-pub(crate) use paper::{CompareArgs, DevicesArgs, InspectArgs};
+pub(crate) use paper::{CompareArgs, DevicesArgs, InspectArgs, ReproduceArgs};
 pub(crate) use pictures::{DepthRange, OverlayArgs, UndistortArgs};
 use truedepth::{
     board::{self, CharucoBoard, Dictionary},
@@ -168,6 +168,7 @@ pub(crate) enum Command {
     // These say themselves, where their options are, what they do.
     Overlay(OverlayArgs),
     Undistort(UndistortArgs),
+    Reproduce(ReproduceArgs),
 
     /// Print the board: a PDF, SVG or PNG true to scale, and the board.toml for recordings of it
     ///

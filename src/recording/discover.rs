@@ -61,6 +61,27 @@ pub fn discover(path: &std::path::Path, limits: &Limits) -> Result<Vec<Found>, E
     discover_in(Arc::new(super::Archive::open(path, limits)?), limits)
 }
 
+/// As [`discover`], also inside the zip archives of a folder, as published data are packed; the archives after the folders,
+/// by name. None is no error here, but a path that cannot be read is.
+#[cfg(feature = "fs")]
+pub fn discover_nested(path: &std::path::Path, limits: &Limits) -> Result<Vec<Found>, Error> {
+    let or_none = |found| match found {
+        Err(Error::NotARecording { .. }) => Ok(Vec::new()),
+        other => other,
+    };
+    if !path.is_dir() {
+        return discover(path, limits);
+    }
+    let mut found = or_none(discover(path, limits))?;
+    let folder = super::Folder::open(path, limits)?;
+    for name in folder.names() {
+        if name.to_ascii_lowercase().ends_with(".zip") {
+            found.extend(or_none(discover(&path.join(name), limits))?);
+        }
+    }
+    Ok(found)
+}
+
 /// All recordings among the files of a source, by name. At least one, else [`Error::NotARecording`].
 ///
 /// A folder that is a recording itself is one: folders further inside are not looked at.

@@ -50,9 +50,9 @@ mod zeiss;
 
 pub use archive::Archive;
 pub use board_file::{board_from_toml, board_to_toml};
-#[cfg(feature = "fs")]
-pub use discover::discover;
 pub use discover::{Found, discover_in};
+#[cfg(feature = "fs")]
+pub use discover::{discover, discover_nested};
 pub use error::Error;
 #[cfg(feature = "fs")]
 pub use folder::{Folder, FolderSink};

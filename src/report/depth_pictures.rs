@@ -2,7 +2,7 @@
 
 use super::{
     DepthStyle, Error,
-    depth_style::depth_range_m,
+    depth_style::{depth_range_m, n_edges},
     drawing::{Panel, Plate, contact_sheet},
     frames::{chosen, in_batches, spread},
 };
@@ -196,6 +196,31 @@ impl DepthPictures<'_> {
             drawn.others.push("overlay.apng".to_owned());
         }
         Ok(drawn)
+    }
+
+    /// Of a spread of the frames the one with most edges in its depth, drawn with these titles: its index and picture.
+    pub(super) fn most_edges(&self, titles: [&'static str; 2]) -> Result<(usize, Rgb), Error> {
+        let frames = chosen(self.recording, self.frames.as_deref())?;
+        let whole: Vec<usize> =
+            frames.iter().copied().filter(|&f| self.other(f).is_some()).collect();
+        let mut best: Option<(usize, usize)> = None;
+        for frame in spread(&whole, MOST_RANGED) {
+            let n = n_edges(&self.recording.depth(frame)?);
+            if best.is_none_or(|(most, _)| n > most) {
+                best = Some((n, frame));
+            }
+        }
+        let Some((_, frame)) = best else { return Err(self.nothing(&frames)) };
+        let corrector = match self.after {
+            After::Corrected(plan) => Some(Corrector::new(self.recording, plan)?),
+            _ => None,
+        };
+        let mut shots = self.shots(frame, corrector.as_ref())?;
+        for (shot, title) in shots.iter_mut().zip(titles) {
+            shot.title = title;
+        }
+        let plate = self.plate(frame, &shots, &self.style, MOVING_WIDTH);
+        Ok((frame, plate.draw(plate.panels[0].image.height() as f64 / 36.0)))
     }
 
     /// All plates of the animation; they are drawn again, smaller.

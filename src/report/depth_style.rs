@@ -102,6 +102,11 @@ impl DepthStyle {
     }
 }
 
+/// How many pixels are an edge of the depth.
+pub(super) fn n_edges(depth: &DepthMap) -> usize {
+    edges(depth).iter().filter(|edge| **edge).count()
+}
+
 /// Where depth jumps: the last pixels of the nearer thing before its shadow, and steps between surfaces that go on with
 /// their slopes on both sides.
 fn edges(depth: &DepthMap) -> Vec<bool> {

@@ -118,6 +118,16 @@ impl LensPictures<'_> {
         Ok(drawn)
     }
 
+    /// The picture of one frame alone. Errors as [`draw`](Self::draw).
+    pub(super) fn one(&self, frame: usize) -> Result<Rgb, Error> {
+        let image = self.recording.rgb(frame)?;
+        let (width, height) = (image.width(), image.height());
+        let warps = Treatment::ALL.map(|t| ColorWarp::new(&self.rectifier.map(t, width, height)));
+        let observation = self.board.map(|board| Detector::new(board).detect(&image.to_gray()));
+        let (plate, _) = self.plate(frame, &image, &warps, observation.as_ref());
+        Ok(plate.draw(height as f64 / 36.0))
+    }
+
     fn plate(
         &self,
         frame: usize,

@@ -7,6 +7,8 @@ use crate::image::Rgb;
 /// How large a photo is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PhotoSize {
+    /// A drawing whose words must stay legible: as it is, up to 4000 pixels wide.
+    Whole,
     /// To look at a corner: at most 800 pixels wide.
     Large,
     /// To see which frame it is and whether the board was found: at most 320 pixels wide.
@@ -17,6 +19,7 @@ impl PhotoSize {
     /// Images wider than this are made smaller by a whole factor.
     const fn max_width(self) -> usize {
         match self {
+            Self::Whole => 4000,
             Self::Large => 800,
             Self::Small => 320,
         }

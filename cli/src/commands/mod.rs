@@ -12,6 +12,7 @@ mod explain;
 mod inspect;
 mod man;
 mod overlay;
+mod reproduce;
 mod simulate;
 mod undistort;
 
@@ -37,6 +38,7 @@ pub(crate) fn dispatch(args: Args, terminal: &Terminal) -> Result<Outcome, Failu
         Command::Compare(args) => compare::run(&args, terminal),
         Command::Correct(args) => correct::run(&args, terminal),
         Command::Overlay(args) => overlay::run(&args, terminal),
+        Command::Reproduce(args) => reproduce::run(&args, terminal),
         Command::Undistort(args) => undistort::run(&args, terminal),
         Command::Calibrate(args) => calibrate::run(&args, terminal),
         Command::Demo(args) => demo::run(&args, terminal),

@@ -20,6 +20,7 @@ mod correct;
 mod detect;
 mod devices;
 mod pictures;
+mod reproduce;
 
 pub use audit::{
     Alignment, Audit, Board, CorrectionInfo, Depth, DepthNoise, DeviceInfo, EvidenceInfo,
@@ -33,6 +34,7 @@ pub use correct::{Correct, PinholeInfo, StepInfo};
 pub use detect::{Detect, DetectedCorner, DetectedIdentity, DetectedImage, RejectedCorner};
 pub use devices::{Compare, IdentityInfo, Inspect, PairCorrections, PairInfo, SheetInfo, SideInfo};
 pub use pictures::{Overlay, OverlayFrame, TreatmentsInfo, Undistort, UndistortFrame};
+pub use reproduce::{CheckInfo, DataInfo, LensInfo, MissingInfo, Reproduce, SectionInfo};
 
 use serde::{Deserialize, Serialize};
 
@@ -67,6 +69,9 @@ pub enum Document {
     /// What `truedepth undistort --json` prints.
     #[serde(rename = "truedepth.undistort/1")]
     Undistort(Box<Undistort>),
+    /// What `truedepth reproduce --json` prints and its `report.json` holds.
+    #[serde(rename = "truedepth.reproduce/1")]
+    Reproduce(Box<Reproduce>),
 }
 
 impl Document {
@@ -193,6 +198,16 @@ mod tests {
         let drawn = pictures.draw(&mut sink, &mut |_, _| ()).unwrap();
         assert_eq!(sink.files().len(), 2, "a picture and an animation; no sheet of one");
         golden("overlay.json", &Document::Overlay(Box::new(Overlay::new(&pictures, &drawn))));
+    }
+
+    /// Without data: what follows from the printed numbers, and what is missing.
+    #[test]
+    fn reproduce() {
+        let paper = crate::reproduce::reproduce("nowhere", Vec::new(), &mut |_| ()).unwrap();
+        let mut document = Reproduce::from(&paper);
+        // `compare.json` holds them.
+        document.pairs.clear();
+        golden("reproduce.json", &Document::Reproduce(Box::new(document)));
     }
 
     #[test]
