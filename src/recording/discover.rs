@@ -61,8 +61,8 @@ pub fn discover(path: &std::path::Path, limits: &Limits) -> Result<Vec<Found>, E
     discover_in(Arc::new(super::Archive::open(path, limits)?), limits)
 }
 
-/// As [`discover`], also inside the zip archives of a folder, as published data are packed; the archives after the folders,
-/// by name. None is no error here, but a path that cannot be read is.
+/// As [`discover`], also inside the zip archives of a folder, as published data are packed; the archives after the
+/// folders, by name. None is no error here, but a path that cannot be read is.
 #[cfg(feature = "fs")]
 pub fn discover_nested(path: &std::path::Path, limits: &Limits) -> Result<Vec<Found>, Error> {
     let or_none = |found| match found {

@@ -138,12 +138,13 @@ fn focal(data: &[Data], calibrated: &[Calibrated]) -> Section {
         let factory = one.paper.factory.as_ref().map(|f| f.intrinsics.focal_px());
         if let Some(row) = nearest_row(source, factory) {
             let exact = |value| Estimate { value, sigma: 0.0 };
-            checks.push(Check::measured(
+            let check = Check::measured(
                 format!("{name}: factory focal length, row “{}”", row.title),
                 Some(Printed { value: row.factory_px, decimals: 2 }),
                 factory.map(exact),
                 "px",
-            ));
+            );
+            checks.push(explained(check));
             checks.push(
                 Check::measured(
                     format!("{name}: focal length as the paper calibrates, row “{}”", row.title),
@@ -302,17 +303,21 @@ fn against_row(data: &Data, sheet: &Sheet, entry: &Entry) -> Vec<Check> {
                 Some(Estimate { value: ours, sigma: 0.0 }),
                 "px",
             );
-            match check.difference() {
-                Some(d) if check.status == super::Status::Differs && (0.0..0.01).contains(&d) => {
-                    check.noted("cut off instead of rounded")
-                }
-                Some(d) if check.status == super::Status::Differs && d.abs() > 0.05 => {
-                    check.noted("recorded at another time than the row, or another unit")
-                }
-                _ => check,
-            }
+            explained(check)
         })
         .collect()
+}
+
+/// Why a number of the metadata is not the printed one.
+fn explained(check: Check) -> Check {
+    match check.difference() {
+        _ if check.status != super::Status::Differs => check,
+        Some(d) if (0.0..0.01).contains(&d) => check.noted("cut off instead of rounded"),
+        Some(d) if d.abs() > 0.05 => {
+            check.noted("recorded at another time than the row, or by another unit")
+        }
+        _ => check,
+    }
 }
 
 /// Figure 7, measured.

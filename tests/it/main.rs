@@ -10,6 +10,7 @@ mod photos;
 mod real_alignment;
 mod real_audit;
 mod recording;
+mod reproduce;
 mod sheet;
 mod tidy;
 

@@ -7,6 +7,7 @@ mod calibrate;
 mod correct;
 mod detect;
 mod pictures;
+mod reproduce;
 mod scratch;
 mod usage;
 

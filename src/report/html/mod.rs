@@ -17,8 +17,8 @@ use super::{
 use crate::audit::Audit;
 
 /// Nothing may be loaded, from anywhere: images come as `data:`, style and script stand in the page.
-pub(super) const POLICY: &str = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'; \
-                      base-uri 'none'; form-action 'none'";
+pub(super) const POLICY: &str = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; \
+                                 script-src 'unsafe-inline'; base-uri 'none'; form-action 'none'";
 
 /// The report as one HTML file, with these pictures of the recording (without any it is the numbers alone) and the
 /// commands that follow from what was typed.

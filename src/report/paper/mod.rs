@@ -81,7 +81,7 @@ pub fn paper_page(paper: &Reproduction, pictures: &PaperPictures) -> String {
                 }
                 footer {
                     p {
-                        "truedepth " (env!("CARGO_PKG_VERSION")) " · the same numbers for programs: report.json, schema "
+                        "truedepth " (env!("CARGO_PKG_VERSION")) " · the same for programs: report.json, schema "
                         code { "truedepth.reproduce/1" }
                     }
                 }
@@ -120,7 +120,7 @@ fn header(paper: &Reproduction) -> Markup {
             h1 { "On the Issues of TrueDepth Sensor Data for Computer Vision Tasks Across Different iPad Generations" }
             p class="device" { "Urban, Lindemeier, Dobbelstein, Haenel, arXiv:2201.10865: its numbers, computed again" }
             p class="board" {
-                @if data.is_empty() { "No recordings in " (paper.place) ": only what follows from the printed numbers." }
+                @if data.is_empty() { "No recordings in " (paper.place) ": only what follows from printed numbers." }
                 @else { "From " (data.join(", ")) "." }
             }
             nav aria-label="Parts of this page" {
@@ -294,7 +294,7 @@ fn device_table() -> Markup {
                 "row", "distortion centre", "reference", "depth f", "depth centre", "centres equal", "colour f",
                 "colour centre",
             ], &rows))
-            p { "Both APIs of each device: differences, the issue they show, and the paper's corrections of it; each is \
+            p { "Both APIs of each device: differences, the issue they show, and the paper's corrections; each is \
                  meant for its own issue only." }
             (wide("Pairs of both APIs", &[
                 "device", "depth f, ARKit against AVFoundation", "reference, the same", "issue", "zoom (issue 1)",

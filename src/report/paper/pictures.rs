@@ -68,9 +68,9 @@ impl PaperPictures {
             };
             let titles = ["AVFoundation, as recorded", "made from it: as ARKit delivers depth"];
             let (frame, image) = drawn.most_edges(titles)?;
-            let caption = "No ARKit recording was published. Left the published AVFoundation recording of an iPad 12.9\" \
-                           4gen with the edges of its depth in orange; right its depth zoomed by 1/0.9507, as the paper \
-                           describes ARKit's: the edges leave the things they belong to.";
+            let caption = "No ARKit recording was published. Left the published AVFoundation recording of an iPad \
+                           12.9\" 4gen with the edges of its depth in orange; right its depth zoomed by 1/0.9507, as \
+                           the paper describes ARKit's: the edges leave the things they belong to.";
             pictures.zoom.push(PlatePicture::new(frame, &image, caption.to_owned()));
         }
         Ok(pictures)

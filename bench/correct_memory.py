@@ -1,0 +1,49 @@
+#!/usr/bin/env python3
+"""Memory of `truedepth correct` from 50 to 5000 frames: peak resident set of the whole process.
+
+    python3 bench/correct_memory.py RECORDING [FRAMES ...]        (50 500 5000; needs 0.5 MB per frame and side)
+
+Frames are those of the recording over and over, hard-linked under new timestamps; depth is zoomed, colour and depth are
+undistorted by a lens that is told (--fault distorted where there are tables). Expects target/release/truedepth, or
+TRUEDEPTH.
+"""
+import json, os, resource, shutil, subprocess, sys, tempfile, time
+from pathlib import Path
+
+root = Path(__file__).resolve().parent.parent
+binary = os.environ.get("TRUEDEPTH", root / "target/release/truedepth")
+source = Path(sys.argv[1])
+counts = [int(n) for n in sys.argv[2:]] or [50, 500, 5000]
+names = sorted(int(p.stem.split("_")[1]) for p in source.glob("rgb_*.png"))
+metadata = {f: json.loads((source / f).read_text()) for f in ("DepthMetadata.json", "CameraMetadata.json")}
+# Beside the source, so that links need not cross file systems; else copies.
+work = Path(tempfile.mkdtemp(prefix="correct-memory-"))
+try:
+    for count in counts:
+        recording = work / f"rec{count}"
+        recording.mkdir()
+        out = {f: [] for f in metadata}
+        for i in range(count):
+            old, new = names[i % len(names)], 1000 + 500 * i
+            for kind in ("rgb", "depth"):
+                one = recording / f"{kind}_{new}.png"
+                first = work / f"first_{kind}_{old}.png"
+                if not first.exists():
+                    shutil.copy(source / f"{kind}_{old}.png", first)
+                os.link(first, one)
+            for f, rows in metadata.items():
+                row = next(r for r in rows if r["Timestamp"] == old)
+                out[f].append({**row, "Timestamp": new})
+        for f, rows in out.items():
+            (recording / f).write_text(json.dumps(rows))
+        start = time.perf_counter()
+        command = [binary, "correct", recording, "-o", work / "out", "--fault", "depth-zoom=0.9507", "-q", "--trust"]
+        pid = os.posix_spawn(str(command[0]), [str(c) for c in command], os.environ)
+        _, status, usage = os.wait4(pid, 0)
+        if status:
+            sys.exit(f"correct ended with {status}")
+        seconds = time.perf_counter() - start
+        print(f"{count} frames: peak {usage.ru_maxrss / 1024:.1f} MB, {seconds:.2f} s", flush=True)
+        shutil.rmtree(work / "out")
+finally:
+    shutil.rmtree(work)
