@@ -78,10 +78,10 @@ Examples:
 ///
 /// DIR is a checkout of ZEISS/iPad_TrueDepth_Issue_Eval, or any folder with some of its recordings inside, also in
 /// zips: FrontCamCalibrationDataset/* and DepthEvalDataset/*. Repeats the calibrations (section 5.1), compares
-/// depth with the board (figure 5, with factory and own intrinsics), recomputes the worked equations and the derived
-/// columns of the device tables, checks the tables against the recordings' metadata, and measures whether images are
-/// rectified (figure 7). Says where the paper is off, and what is not there and how to get it. Without any recording only what
-/// follows from the printed numbers is computed.
+/// depth with the board (figure 5, with factory and own intrinsics), recomputes the worked equations and the
+/// derived columns of the device tables, checks the tables against the recordings' metadata, and measures whether
+/// images are rectified (figure 7). Says where the paper is off, and what is not there and how to get it. Without
+/// any recording only what follows from the printed numbers is computed.
 ///
 /// Leaves report.html and report.json in ./paper-reproduced, or where -o says. Exits with 0 whatever it finds.
 #[derive(Debug, clap::Args)]
