@@ -13,6 +13,7 @@ use crate::{
     depth::{BoardDepth, Handedness, Patches, Registration},
     detect::{Detector, Observation},
     diagnose::{Device, DistortionState, Finding, Verdict},
+    image::Rgb,
     pose::View,
     recording::{self, Factory, Problem, Recording},
 };
@@ -149,6 +150,9 @@ pub enum Error {
     CameraSize(#[from] OtherSize),
 }
 
+/// Is shown a frame's index and its colour image.
+pub type Witness<'a> = &'a (dyn Fn(usize, &Rgb) + Sync);
+
 /// Looks at everything. See [`audit_observed`] to be told how far it has come.
 ///
 /// Errors: a file that cannot be read or decoded, no board known, no colour image at all, colour and depth of different
@@ -163,6 +167,19 @@ pub fn audit_observed(
     options: &Options,
     observer: &(dyn Fn(Progress) + Sync),
 ) -> Result<Audit, Error> {
+    audit_watched(recording, options, observer, None)
+}
+
+/// As [`audit_observed`]; calls `witness` (from any thread) with each colour image that is looked at, so that who wants
+/// something of it need not decode it again.
+///
+/// Errors: as [`audit`].
+pub fn audit_watched(
+    recording: &Recording,
+    options: &Options,
+    observer: &(dyn Fn(Progress) + Sync),
+    witness: Option<Witness<'_>>,
+) -> Result<Audit, Error> {
     let place = || recording.place().to_owned();
     let board = options.board.as_ref().or(recording.board.as_ref());
     let board = board.cloned().ok_or_else(|| Error::NoBoard { recording: place() })?;
@@ -171,7 +188,7 @@ pub fn audit_observed(
         return Err(Error::NoImages { recording: place(), n_frames });
     }
 
-    let frames = look(recording, &board, observer)?;
+    let frames = look(recording, &board, observer, witness)?;
     let ground = Ground {
         name: &recording.name,
         place: recording.place(),
@@ -187,13 +204,14 @@ fn look(
     recording: &Recording,
     board: &CharucoBoard,
     observer: &(dyn Fn(Progress) + Sync),
+    witness: Option<Witness<'_>>,
 ) -> Result<Vec<FrameAudit>, Error> {
     let detector = Detector::new(board);
     let total = recording.frames.len();
     let done = AtomicUsize::new(0);
     observer(Progress { stage: Stage::Detect, done: 0, total });
     let one = |index: usize| {
-        let frame = look_at(recording, board, &detector, index);
+        let frame = look_at(recording, board, &detector, (index, witness));
         let done = 1 + done.fetch_add(1, Ordering::Relaxed);
         observer(Progress { stage: Stage::Detect, done, total });
         frame
@@ -213,7 +231,7 @@ fn look_at(
     recording: &Recording,
     board: &CharucoBoard,
     detector: &Detector,
-    index: usize,
+    (index, witness): (usize, Option<Witness<'_>>),
 ) -> Result<FrameAudit, Error> {
     let source = &recording.frames[index];
     let mut frame = FrameAudit {
@@ -222,7 +240,14 @@ fn look_at(
         ..FrameAudit::blank(source.timestamp, source.t_ns)
     };
     let Some(color) = &source.color else { return Ok(frame) };
-    let gray = recording.gray(index)?;
+    let gray = match witness {
+        None => recording.gray(index)?,
+        Some(witness) => {
+            let image = recording.rgb(index)?;
+            witness(index, &image);
+            image.to_gray()
+        }
+    };
     let color_size = [gray.width(), gray.height()];
     frame.size_px = Some(color_size);
     frame.observation = detector.detect(&gray);

@@ -30,5 +30,5 @@ mod job;
 mod options;
 
 pub use conclude::{Seen, audit_seen};
-pub use job::{Audit, Error, FrameAudit, audit, audit_observed};
+pub use job::{Audit, Error, FrameAudit, Witness, audit, audit_observed, audit_watched};
 pub use options::{Method, Options, Progress, Stage};

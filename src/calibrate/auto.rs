@@ -2,6 +2,7 @@
 
 use super::{
     Candidate, Error, Estimate, Input, Model, Outlier, RejectedFrame, SurfaceCandidate,
+    abreast::abreast,
     fit::{Data, Fit, Start, Wanted, fit},
     model::{Aspect, Center, Shape, Warp},
     problem::Measured,
@@ -10,7 +11,7 @@ use super::{
     weigh::{drop_outliers, weigh},
 };
 use crate::{
-    camera::{Camera, Distortion},
+    camera::{Camera, Distortion, Intrinsics},
     detect::Corner,
     geom::{Board, Color, Pose, Vector3},
     pose::Weighting,
@@ -26,8 +27,8 @@ pub(super) const MIN_PICTURES: usize = 3;
 /// Corners up to so many standard deviations count in full, beyond only linearly: 1 % of normal ones do.
 const LOSS: Loss = Loss::Huber { threshold: 3.0 };
 
-/// Parameters are good to 1e-4 of their σ then.
-const COST_TOLERANCE: f64 = 1e-12;
+/// The last step is smaller than some 1e-3 σ, its error than the square of that.
+const COST_TOLERANCE: f64 = 1e-10;
 
 /// Views, weighed, without outliers, ready for any model.
 pub(super) struct Prepared {
@@ -42,6 +43,10 @@ pub(super) struct Prepared {
     pub(super) form: Form,
     /// All surfaces tried.
     pub(super) surfaces: Vec<SurfaceCandidate>,
+    /// A camera near every other: where fits start.
+    pub(super) near: Intrinsics,
+    /// Its k1 and k2, where they were free.
+    pub(super) near_warp: Vec<f64>,
 }
 
 impl Prepared {
@@ -83,6 +88,8 @@ pub(super) fn prepare(input: &Input<'_>) -> Result<Prepared, Error> {
         surface: Surface::Flat,
         form: Form::default(),
         surfaces: Vec::new(),
+        near: *input.factory,
+        near_warp: Vec::new(),
     };
     let pinhole = Camera { intrinsics: *input.factory, distortion: Distortion::None };
     let first = residuals_px(&prepared, &pinhole);
@@ -96,6 +103,11 @@ pub(super) fn prepare(input: &Input<'_>) -> Result<Prepared, Error> {
         }
         prepared.surface = shape.surface;
         prepared.form = fit.form(&shape);
+        prepared.near = shape.intrinsics(input.factory, &fit.free);
+        prepared.near_warp = match shape.warp {
+            Warp::FreeRadial2 => shape.warp_numbers(&fit.free).to_vec(),
+            _ => Vec::new(),
+        };
         let residuals = residuals_px(&prepared, &camera);
         let n_corners: usize = residuals.iter().map(Vec::len).sum();
         let taken = (fit.free.len() + 6 * residuals.len()) as f64;
@@ -128,27 +140,40 @@ fn flexible<'a>(
     if prepared.n_pictures() < MIN_PICTURES {
         return Err(underdetermined(prepared, None));
     }
-    let mut closest: Option<Estimate> = None;
-    let mut attempt = |center, warp, surface| {
-        let shape = Shape { center, warp, aspect: Aspect::Fixed, surface };
-        let fit = fit_with(input, prepared, shape, loss)?;
+    let determined = |fit: &Fit| {
         let focal = fit.focal_px();
-        if focal.sigma <= MAX_FOCAL_SIGMA * focal.value {
-            return Some((shape, fit));
-        }
-        closest = focal.sigma.is_finite().then_some(focal).or(closest);
-        None
+        focal.sigma <= MAX_FOCAL_SIGMA * focal.value
     };
-    let flat = attempt(Center::Free, Warp::FreeRadial2, Surface::Flat)
-        .or_else(|| attempt(Center::Free, Warp::None, Surface::Flat))
-        .or_else(|| attempt(Center::Fixed, Warp::None, Surface::Flat));
-    let Some(flat) = flat else { return Err(underdetermined(prepared, closest)) };
-    let (center, warp) = (flat.0.center, flat.0.warp);
-    let mut tried = vec![flat];
-    for surface in [Surface::Bend, Surface::Free] {
-        if prepared.sheet.allows(surface) {
-            tried.extend(attempt(center, warp, surface));
+    let shape_of = |center, warp, surface| Shape { center, warp, aspect: Aspect::Fixed, surface };
+    let cameras = [
+        (Center::Free, Warp::FreeRadial2),
+        (Center::Free, Warp::None),
+        (Center::Fixed, Warp::None),
+    ];
+    let mut surfaces = vec![Surface::Flat, Surface::Bend, Surface::Free];
+    surfaces.retain(|surface| prepared.sheet.allows(*surface));
+    let mut closest: Option<Estimate> = None;
+    let mut tried = Vec::new();
+    for (center, warp) in cameras {
+        let fits = abreast(&surfaces, |surface| {
+            let shape = shape_of(center, warp, *surface);
+            Some((shape, fit_with(input, prepared, shape, loss)?))
+        });
+        // A camera that a flat board does not determine, no other board does.
+        match fits.first() {
+            Some(Some((_, flat))) if determined(flat) => {
+                tried = fits.into_iter().flatten().filter(|(_, fit)| determined(fit)).collect();
+                break;
+            }
+            Some(Some((_, flat))) => {
+                let focal = flat.focal_px();
+                closest = focal.sigma.is_finite().then_some(focal).or(closest);
+            }
+            _ => {}
         }
+    }
+    if tried.is_empty() {
+        return Err(underdetermined(prepared, closest));
     }
     let (chosen, behind) = simplest(&tried.iter().map(|(_, fit)| fit).collect::<Vec<_>>());
     prepared.surfaces = tried
@@ -204,7 +229,7 @@ fn residuals(
     prepared.views.iter().zip(poses).map(of_view).collect()
 }
 
-/// A shape fitted to prepared views, from the factory's numbers.
+/// A shape fitted to prepared views.
 pub(super) fn fit_prepared(
     input: &Input<'_>,
     prepared: &Prepared,
@@ -217,7 +242,13 @@ fn fit_with(input: &Input<'_>, prepared: &Prepared, shape: Shape<'_>, loss: Loss
     let references = prepared.references();
     let data = data(input, prepared, (&references, &prepared.pictures), loss);
     let poses: Vec<_> = prepared.views.iter().map(|v| v.pose).collect();
-    let mut free = shape.start(input.factory);
+    let mut free = shape.start(&prepared.near);
+    if matches!(shape.warp, Warp::FreeRadial1 | Warp::FreeRadial2 | Warp::FreeBrown) {
+        let n_numbers = shape.warp_numbers(&free).len();
+        let first = if shape.center == Center::Free { 3 } else { 1 };
+        let numbers = free[first..first + n_numbers].iter_mut();
+        numbers.zip(&prepared.near_warp).for_each(|(number, near)| *number = *near);
+    }
     let mut heights_m = &[][..];
     if shape.surface == prepared.surface {
         let n_camera = shape.n_camera(&free);
@@ -290,14 +321,12 @@ pub(super) fn choose(
     prepared: &Prepared,
     models: &[Model],
 ) -> Result<(Model, Vec<(Candidate, Fit)>), Error> {
-    let fits: Vec<(Model, Fit)> = models
-        .iter()
-        .filter_map(|&model| {
-            let fit = fit_prepared(input, prepared, model.shape(input.tables, prepared.surface)?)?;
-            let focal = fit.focal_px();
-            (focal.sigma <= MAX_FOCAL_SIGMA * focal.value).then_some((model, fit))
-        })
-        .collect();
+    let fits = abreast(models, |&model| {
+        let fit = fit_prepared(input, prepared, model.shape(input.tables, prepared.surface)?)?;
+        let focal = fit.focal_px();
+        (focal.sigma <= MAX_FOCAL_SIGMA * focal.value).then_some((model, fit))
+    });
+    let fits: Vec<(Model, Fit)> = fits.into_iter().flatten().collect();
     if fits.is_empty() {
         return Err(underdetermined(prepared, None));
     }

@@ -2,6 +2,7 @@
 
 use super::{
     DistortionTest, Estimate, Hypothesis, Input, Lens,
+    abreast::abreast,
     auto::{Prepared, behind_sigmas, fit_prepared, shape_rms_px},
     fit::Fit,
     model::{Aspect, Center, Shape, Warp, brown},
@@ -11,44 +12,55 @@ use crate::camera::{Intrinsics, RadialTable, TablePair};
 
 /// Fits every hypothesis; `None` where the views do not determine k1.
 pub(super) fn test(input: &Input<'_>, prepared: &Prepared) -> Option<DistortionTest> {
-    let mut hypotheses = Vec::new();
-    let mut add = |lens: Lens, warp: Warp<'_>| -> Option<Fit> {
+    let mut warps = vec![(Lens::None, Warp::None)];
+    if let Some(TablePair { forward, inverse }) = input.tables {
+        warps.extend([
+            (Lens::InverseTable, Warp::Table(inverse)),
+            (Lens::ForwardTable, Warp::Table(forward)),
+            (Lens::FreeTable, Warp::FreeTable(inverse)),
+        ]);
+    }
+    warps.extend([(Lens::FreeRadial, Warp::FreeRadial1), (Lens::FreeRadial, Warp::FreeRadial2)]);
+    let mut found = abreast(&warps, |&(lens, warp)| {
         let shape = shape_of(warp, prepared.surface);
         let fit = fit_prepared(input, prepared, shape).filter(|fit| fit.covariance.is_some())?;
         let flat = Shape { surface: Surface::Flat, ..shape };
-        let flat_fit = match prepared.surface {
-            Surface::Flat => fit.clone(),
-            Surface::Bend | Surface::Free => fit_prepared(input, prepared, flat)?,
+        let flat_rms_px = match prepared.surface {
+            Surface::Flat => shape_rms_px(input, prepared, shape, &fit),
+            Surface::Bend | Surface::Free => {
+                shape_rms_px(input, prepared, flat, &fit_prepared(input, prepared, flat)?)
+            }
         };
-        hypotheses.push(Hypothesis {
+        let hypothesis = Hypothesis {
             lens,
             rms_px: shape_rms_px(input, prepared, shape, &fit),
-            flat_rms_px: shape_rms_px(input, prepared, flat, &flat_fit),
+            flat_rms_px,
             held_out_rms_px: prepared.held_out_rms_px(&fit).value,
             focal_px: fit.focal_px(),
             center_px: [fit.estimate(1), fit.estimate(2)],
-        });
-        Some(fit)
-    };
-    add(Lens::None, Warp::None);
+        };
+        Some((hypothesis, fit))
+    });
+    let two = found.pop()?;
+    let one = found.pop()??;
+    // A second number only where held-out pictures ask for it.
+    let two = two.filter(|(_, fit)| behind_sigmas(&one.1, fit) > 1.0);
+    let is_two = two.is_some();
+    let (radial, by_radial) = two.unwrap_or(one);
+    let mut hypotheses = Vec::new();
     let mut by_table = None;
-    if let Some(TablePair { forward, inverse }) = input.tables {
-        add(Lens::InverseTable, Warp::Table(inverse));
-        add(Lens::ForwardTable, Warp::Table(forward));
-        by_table = add(Lens::FreeTable, Warp::FreeTable(inverse)).map(|fit| (fit, inverse));
+    for (hypothesis, fit) in found.into_iter().flatten() {
+        if let (Lens::FreeTable, Some(tables)) = (hypothesis.lens, input.tables) {
+            by_table = Some((fit, &tables.inverse));
+        }
+        hypotheses.push(hypothesis);
     }
-    let one = shape_of(Warp::FreeRadial1, prepared.surface);
-    let two = shape_of(Warp::FreeRadial2, prepared.surface);
-    let fit_one = fit_prepared(input, prepared, one).filter(|fit| fit.covariance.is_some())?;
-    let fit_two = fit_prepared(input, prepared, two)
-        .filter(|fit| fit.covariance.is_some() && behind_sigmas(&fit_one, fit) > 1.0);
-    let radial = if fit_two.is_some() { two.warp } else { one.warp };
-    let by_radial = add(Lens::FreeRadial, radial)?;
+    hypotheses.push(radial);
 
     let corner_shift_px = match &by_table {
         Some((fit, table)) => propagate(fit, |free| Some(table_shift_px(table, free[3]))),
         None => {
-            let n_radial = if fit_two.is_some() { 2 } else { 1 };
+            let n_radial = if is_two { 2 } else { 1 };
             propagate(&by_radial, |free| {
                 radial_shift_px(input.factory, free, &free[3..3 + n_radial])
             })
@@ -57,7 +69,7 @@ pub(super) fn test(input: &Input<'_>, prepared: &Prepared) -> Option<DistortionT
     Some(DistortionTest {
         amplitude: by_table.as_ref().map(|(fit, _)| fit.estimate(3)),
         k1: by_radial.estimate(3),
-        k2: fit_two.is_some().then(|| by_radial.estimate(4)),
+        k2: is_two.then(|| by_radial.estimate(4)),
         corner_shift_px,
         table_corner_shift_px: input.tables.map(|tables| table_shift_px(&tables.inverse, 1.0)),
         hypotheses,

@@ -3,6 +3,7 @@
 use super::{
     Calibration, Candidate, DistortionTest, Error, Input, LeftOutPicture, Method, Model, Parameter,
     RollingShutter,
+    abreast::both,
     auto::{self, MAX_FOCAL_SIGMA, MIN_PICTURES, Prepared},
     distortion,
     fit::{Data, Fit, Start, Wanted, fit},
@@ -14,7 +15,7 @@ use super::{
 use crate::{
     geom::{Board, Point},
     pose::View,
-    solve::{Effort, Loss},
+    solve::Loss,
 };
 
 /// The intrinsics that explain these corners.
@@ -82,6 +83,9 @@ pub fn distortion_test(input: &Input<'_>) -> Option<DistortionTest> {
     distortion::test(input, &auto::prepare(input).ok()?)
 }
 
+/// The last step is smaller than 1e-4 σ, its error than the square of that.
+const PLAIN_TOLERANCE: f64 = 1e-12;
+
 /// All views and corners alike, no loss.
 fn plain(
     input: &Input<'_>,
@@ -99,7 +103,7 @@ fn plain(
         pictures: &pictures,
         loss: Loss::Squared,
         sheet: &sheet,
-        cost_tolerance: Effort::default().cost_tolerance,
+        cost_tolerance: PLAIN_TOLERANCE,
         wanted: Wanted::Everything,
     };
     let poses: Vec<_> = views.iter().map(|v| v.pose).collect();
@@ -114,6 +118,8 @@ fn plain(
         surface: Surface::Flat,
         form: Form::default(),
         surfaces: Vec::new(),
+        near: *input.factory,
+        near_warp: Vec::new(),
     };
     let fit = fit.ok_or_else(|| auto::underdetermined(&prepared, None))?;
     let result = Parts { method, model, shape, candidates: Vec::new() };
@@ -129,14 +135,16 @@ fn robust(
     candidates: Vec<Candidate>,
 ) -> Result<Calibration, Error> {
     let shape = model.shape(input.tables, prepared.surface).ok_or(Error::NoTables { model })?;
-    let halves = [0, 1].map(|first| auto::half_focal_px(input, &prepared, shape, fit, first));
-    let distortion = distortion::test(input, &prepared);
+    let half = |first| auto::half_focal_px(input, &prepared, shape, fit, first);
+    let (distortion, (halves, full)) = both(
+        || distortion::test(input, &prepared),
+        || both(|| both(|| half(0), || half(1)), || auto::in_full(input, &prepared, shape, fit)),
+    );
+    let full = full.ok_or_else(|| auto::underdetermined(&prepared, None))?;
     let parts = Parts { method, model, shape, candidates };
-    let full = auto::in_full(input, &prepared, shape, fit)
-        .ok_or_else(|| auto::underdetermined(&prepared, None))?;
     let mut calibration = assemble(input, parts, prepared, &full)?;
     calibration.split_half_focal_px = match halves {
-        [Some(a), Some(b)] => Some([a, b]),
+        (Some(a), Some(b)) => Some([a, b]),
         _ => None,
     };
     calibration.distortion = distortion;

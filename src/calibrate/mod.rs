@@ -41,6 +41,8 @@
 //!
 //! Not here: images, files, verdicts.
 
+mod abreast;
+
 mod model;
 
 mod surface;

@@ -9,7 +9,7 @@ use crate::{
     detect::Corner,
     geom::{Board, Color, Pixel, Pose, Vector3},
     pose,
-    solve::{BlockNormal, Bordered, Loss},
+    solve::{BlockNormal, Bordered, Loss, Row, vectorized},
 };
 
 /// One view as the solver sees it.
@@ -55,7 +55,7 @@ enum ReadyLens<'a> {
     None,
     Table(&'a RadialTable),
     FreeTable { scaled: RadialTable, whole: &'a RadialTable },
-    Brown(Brown),
+    Brown { lens: Brown, first_dip: f64 },
 }
 
 impl<'a, const S: usize> Reprojection<'a, S> {
@@ -68,7 +68,8 @@ impl<'a, const S: usize> Reprojection<'a, S> {
                 ReadyLens::FreeTable { scaled: whole.scaled(numbers[0]), whole }
             }
             Warp::FreeRadial1 | Warp::FreeRadial2 | Warp::FreeBrown => {
-                ReadyLens::Brown(brown(numbers))
+                let lens = brown(numbers);
+                ReadyLens::Brown { lens, first_dip: lens.first_dip() }
             }
         };
         Ready {
@@ -84,7 +85,7 @@ impl<'a, const S: usize> Reprojection<'a, S> {
 
 impl Ready<'_> {
     /// Where a point of the camera's frame is drawn; `None` behind the camera and outside the lens' domain.
-    #[inline]
+    #[inline(always)]
     fn project<const S: usize>(&self, point: &Vector3<f64>) -> Option<Drawn<S>> {
         if !(point.z > 0.0) {
             return None;
@@ -118,8 +119,8 @@ impl Ready<'_> {
                 by_shared[1][3] = -m * (c * x + d * y);
                 ([pixel.x, pixel.y], [[a * fx, b * fy], [c * fx, d * fy]])
             }
-            ReadyLens::Brown(brown) => {
-                let distorted @ [x, y] = brown.distort([u, v])?;
+            ReadyLens::Brown { lens: brown, first_dip } => {
+                let distorted @ [x, y] = brown.distort_before(*first_dip, [u, v])?;
                 self.by_pinhole(&mut by_shared, distorted, None);
                 let [k_x, k_y] = brown.d_distorted_d_parameters([u, v]);
                 for (i, (k_x, k_y)) in k_x.into_iter().zip(k_y).take(self.n_warp).enumerate() {
@@ -138,7 +139,7 @@ impl Ready<'_> {
     }
 
     /// Derivatives by focal length and centre of (fx·x + cx, fy·y + cy), followed by a map with Jacobian `after`.
-    #[inline]
+    #[inline(always)]
     fn by_pinhole<const S: usize>(
         &self,
         by_shared: &mut [[f64; S]; 2],
@@ -162,6 +163,9 @@ impl Ready<'_> {
     }
 }
 
+/// So many residuals go through the normal equations together, an even number.
+const ROWS_AT_ONCE: usize = 8;
+
 /// How far a view may turn (radians) and shift (metres) while the rows of its image are read: a hand leads a camera by
 /// a quarter of a radian and some centimetres a second, and reading takes some ten milliseconds.
 const MOTION_SIGMA: [f64; 6] = [4e-3, 4e-3, 4e-3, 2e-3, 2e-3, 2e-3];
@@ -169,8 +173,22 @@ const MOTION_SIGMA: [f64; 6] = [4e-3, 4e-3, 4e-3, 2e-3, 2e-3, 2e-3];
 impl<const S: usize> Reprojection<'_, S> {
     /// Adds all residuals of a view; `own` takes the derivatives by the pose, and the time at which the corner's row is
     /// read (from −½ at the top to ½ at the bottom of the image), to those by the block's parameters.
-    #[inline]
     fn add_view<const B: usize>(
+        &self,
+        index: usize,
+        numbers: (&[f64; S], &[f64]),
+        pose: &Pose<Color, Board>,
+        normal: &mut BlockNormal<S, B>,
+        own: impl Fn(&[f64; 6], f64) -> [f64; B],
+    ) -> bool {
+        vectorized(
+            #[inline(always)]
+            || self.add_corners(index, numbers, pose, normal, own),
+        )
+    }
+
+    #[inline(always)]
+    fn add_corners<const B: usize>(
         &self,
         index: usize,
         (shared, heights_m): (&[f64; S], &[f64]),
@@ -183,41 +201,56 @@ impl<const S: usize> Reprojection<'_, S> {
         }
         let ready = self.ready(shared);
         let view = self.views[index];
-        let rotation = pose.rotation.matrix();
+        let rotation = *pose.rotation.matrix();
         let normal_axis = rotation.column(2).into_owned();
         let surface = self.shape.surface;
         let numbers = self.shape.surface_numbers(shared);
         let first = S - numbers.len();
-        let rows = self.factory.height as f64;
+        let per_row = (self.factory.height as f64).recip();
+        if !heights_m.is_empty() {
+            normal.reserve_loose(view.corners.len());
+        }
+        let mut rows = [Row::ZERO; ROWS_AT_ONCE];
+        let mut n_rows = 0;
         for (index, corner) in view.corners.iter().enumerate() {
             let point = &view.points[index];
             let place = self.sheet.lifted(surface, (corner.id, point), (numbers, heights_m));
             let turned = rotation * place.coords;
-            let Some(mut drawn) = ready.project::<S>(&(turned + pose.translation)) else {
+            let Some(drawn) = ready.project::<S>(&(turned + pose.translation)) else {
                 return false;
             };
-            let by_surface = self.sheet.by_shared(surface, point).map(|by| rotation * by);
-            let [dx, dy] = [corner.pixel.x - drawn.pixel[0], corner.pixel.y - drawn.pixel[1]];
-            let square = view.weights[index] * (dx * dx + dy * dy);
+            let residual = [corner.pixel.x - drawn.pixel[0], corner.pixel.y - drawn.pixel[1]];
+            let square = view.weights[index] * (residual[0].powi(2) + residual[1].powi(2));
             let weight = view.weights[index] * self.loss.weight(square);
-            let time = (corner.pixel.y + 0.5) / rows - 0.5;
+            let time = (corner.pixel.y + 0.5) * per_row - 0.5;
             normal.add_cost(0.5 * self.loss.rho(square));
-            for (residual, row) in [(dx, 0), (dy, 1)] {
-                let by_point = drawn.by_point[row];
+            for axis in 0..2 {
+                let by_point = drawn.by_point[axis];
                 let along =
                     |v: &Vector3<f64>| by_point[0] * v.x + by_point[1] * v.y + by_point[2] * v.z;
-                let by_shared = &mut drawn.by_shared[row];
-                for (derivative, by) in by_shared[first..].iter_mut().zip(&by_surface) {
-                    *derivative = along(by);
+                let row = &mut rows[n_rows];
+                row.weight = weight;
+                row.residual = residual[axis];
+                row.d_shared = drawn.by_shared[axis];
+                if !numbers.is_empty() {
+                    let by_surface = self.sheet.by_shared(surface, point);
+                    for (derivative, by) in row.d_shared[first..].iter_mut().zip(by_surface) {
+                        *derivative = along(&(rotation * by));
+                    }
                 }
-                let by_own = own(&pose::d_pixel_d_pose(by_point, &turned), time);
-                normal.add_row(weight, residual, by_shared, &by_own);
+                row.d_block = own(&pose::d_pixel_d_pose(by_point, &turned), time);
                 if !heights_m.is_empty() {
-                    let by_height = (corner.id, along(&normal_axis));
-                    normal.add_loose((weight, residual), (by_shared, &by_own), by_height);
+                    normal.add_loose(row, (corner.id, along(&normal_axis)));
                 }
+                n_rows += 1;
+            }
+            if n_rows == ROWS_AT_ONCE {
+                normal.add_rows(&rows);
+                n_rows = 0;
             }
         }
+        rows[n_rows..].fill(Row::ZERO);
+        normal.add_rows(&rows);
         true
     }
 

@@ -6,8 +6,7 @@ use crate::{
     camera::{Camera, Distortion},
     detect::Corner,
     geom::{Board, Color, Pose, Vector3},
-    pose::{View, Weighting},
-    solve,
+    pose::{self, View, Weighting},
 };
 
 /// Corners a view needs where the paper's rule does not apply: its pose takes three, the rest tells of the camera.
@@ -86,11 +85,10 @@ pub(super) fn all_usable(input: &Input<'_>, min_corners: usize, weighting: Weigh
         } else if narrow_spread(input.board, &corners) < MIN_SPREAD_SQUARES {
             Err(Rejection::NarrowCorners { n_corners })
         } else {
-            View::from_corners(frame, input.board, &camera, &corners, weighting)
-                .map_err(Rejection::NoPose)
+            pose::start(frame, input.board, &camera, &corners, weighting).map_err(Rejection::NoPose)
         };
         match fitted {
-            Ok(view) => views.push(measured(input.board, frame, corners, view.color_from_board)),
+            Ok(pose) => views.push(measured(input.board, frame, corners, pose)),
             Err(reason) => rejected.push(RejectedFrame { frame, reason }),
         }
     }
@@ -159,10 +157,9 @@ pub(super) fn pictures(views: &[&Measured], width_px: usize) -> Vec<usize> {
             .iter()
             .enumerate()
             .filter_map(|(number, &leader)| {
-                Some((distance_px(views[leader], views[index])?, number))
+                Some((distance_px(views[leader], views[index], near_px)?, number))
             })
-            .min_by(|a, b| a.0.total_cmp(&b.0))
-            .filter(|(distance, _)| *distance < near_px);
+            .min_by(|a, b| a.0.total_cmp(&b.0));
         picture[index] = match nearest {
             Some((_, number)) => number,
             None => {
@@ -174,22 +171,29 @@ pub(super) fn pictures(views: &[&Measured], width_px: usize) -> Vec<usize> {
     picture
 }
 
-/// The mean distance of common corners, by ids in ascending order; `None` where there are fewer than four.
-fn distance_px(a: &Measured, b: &Measured) -> Option<f64> {
+/// The mean distance of common corners, by ids in ascending order; `None` where there are fewer than four, and where it
+/// is `near_px` or more.
+fn distance_px(a: &Measured, b: &Measured, near_px: f64) -> Option<f64> {
     let (mut i, mut j) = (0, 0);
-    let mut distances = Vec::new();
+    let (mut sum, mut n) = (0.0, 0_u32);
+    let far = near_px * a.corners.len().min(b.corners.len()) as f64;
     while let (Some(p), Some(q)) = (a.corners.get(i), b.corners.get(j)) {
         match p.id.cmp(&q.id) {
             std::cmp::Ordering::Less => i += 1,
             std::cmp::Ordering::Greater => j += 1,
             std::cmp::Ordering::Equal => {
-                distances.push(p.pixel.distance(q.pixel));
+                let [x, y] = p.pixel - q.pixel;
+                sum += (x * x + y * y).sqrt();
+                if sum >= far {
+                    return None; // However many there are.
+                }
+                n += 1;
                 i += 1;
                 j += 1;
             }
         }
     }
-    (distances.len() >= 4).then(|| solve::mean(&distances))
+    Some(sum / f64::from(n)).filter(|mean| n >= 4 && *mean < near_px)
 }
 
 /// The largest angle between the optical axis and the board's normal, degrees.

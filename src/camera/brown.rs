@@ -99,6 +99,7 @@ impl Brown {
 
     /// Partial derivatives of the distorted direction (rows x', y') by the direction (columns x, y). Meaningful in
     /// the valid domain.
+    #[inline(always)]
     pub fn d_distorted_d_ray(&self, [x, y]: [f64; 2]) -> [[f64; 2]; 2] {
         let r2 = x * x + y * y;
         let radial = 1.0 + r2 * (self.k1 + r2 * (self.k2 + r2 * self.k3));
@@ -112,6 +113,7 @@ impl Brown {
     }
 
     /// Partial derivatives of the distorted direction (rows x', y') by k1 k2 p1 p2 k3 (columns).
+    #[inline(always)]
     pub fn d_distorted_d_parameters(&self, [x, y]: [f64; 2]) -> [[f64; 5]; 2] {
         let r2 = x * x + y * y;
         let (r4, r6) = (r2 * r2, r2 * r2 * r2);
@@ -150,21 +152,42 @@ impl Brown {
     }
 
     /// In the valid domain?
-    fn is_valid(&self, [x, y]: [f64; 2]) -> bool {
+    fn is_valid(&self, ray: [f64; 2]) -> bool {
+        self.is_valid_before(self.first_dip(), ray)
+    }
+
+    /// The r² of the first extremum of the radial map's slope at which the slope is no longer positive; infinite where
+    /// there is none.
+    pub(crate) fn first_dip(&self) -> f64 {
+        let dips = |turn: &f64| !(self.radial_slope(*turn) > 0.0);
+        self.extrema_of_slope().into_iter().flatten().find(dips).unwrap_or(f64::INFINITY)
+    }
+
+    /// d(r·radial)/dr at s = r².
+    #[inline(always)]
+    fn radial_slope(&self, s: f64) -> f64 {
+        1.0 + s * (3.0 * self.k1 + s * (5.0 * self.k2 + s * 7.0 * self.k3))
+    }
+
+    /// In the valid domain, the first dip being known?
+    #[inline(always)]
+    fn is_valid_before(&self, first_dip: f64, [x, y]: [f64; 2]) -> bool {
         let s = x * x + y * y;
-        let derivative =
-            |s: f64| 1.0 + s * (3.0 * self.k1 + s * (5.0 * self.k2 + s * 7.0 * self.k3));
-        if !(derivative(s) > 0.0) {
-            return false; // NaN comes here, too.
-        }
-        let dips = |turn: f64| turn < s && derivative(turn) <= 0.0;
-        if self.extrema_of_slope().into_iter().flatten().any(dips) {
+        // NaN is beyond everything.
+        if !(self.radial_slope(s) > 0.0) || first_dip < s {
             return false;
         }
         let [[a, b], [c, d]] = self.d_distorted_d_ray([x, y]);
         a > 0.0 && a * d - b * c > 0.0
     }
 
+    /// As [`distort`](Self::distort) for many directions, [`first_dip`](Self::first_dip) being known.
+    #[inline(always)]
+    pub(crate) fn distort_before(&self, first_dip: f64, ray: [f64; 2]) -> Option<[f64; 2]> {
+        self.is_valid_before(first_dip, ray).then(|| self.polynomial(ray))
+    }
+
+    #[inline(always)]
     fn polynomial(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let r2 = x * x + y * y;
         let radial = 1.0 + r2 * (self.k1 + r2 * (self.k2 + r2 * self.k3));

@@ -159,7 +159,7 @@ pub fn patches(map: &DepthMap, board: &CharucoBoard, corners: &[Corner]) -> Opti
                 }
             }
             let n_holes = side_px * side_px - samples.len();
-            match patch(middle, &mut samples, n_holes).filter(|p| 2 * p.n >= side_px * side_px) {
+            match patch(middle, &samples, n_holes).filter(|p| 2 * p.n >= side_px * side_px) {
                 Some(patch) => patches.measured.push(patch),
                 None => patches.torn.push((middle, n_holes)),
             }
@@ -179,56 +179,80 @@ fn outline(low: f64, right: f64, bottom: f64) -> impl Iterator<Item = Pixel> {
 }
 
 /// Fits 1/depth = a + b·x + c·y twice: the second time without pixels far off the first plane.
-fn patch(middle: Pixel, samples: &mut Vec<[f64; 3]>, n_holes: usize) -> Option<Patch> {
-    let mut found = None;
-    for _ in 0..2 {
-        let plane = fit_plane(samples)?;
-        let off = |s: &[f64; 3]| s[2] - plane[0] - plane[1] * s[0] - plane[2] * s[1];
-        let squares: f64 = samples.iter().map(|s| off(s).powi(2)).sum();
-        let sigma = (squares / (samples.len() as f64 - 3.0)).sqrt();
-        let n = samples.len() as f64;
-        let mean = |i: usize| samples.iter().map(|s| s[i]).sum::<f64>() / n;
-        let inverse_per_m = mean(2);
-        found = Some(Patch {
-            at: Pixel::new(middle.x + mean(0), middle.y + mean(1)),
-            inverse_per_m,
-            // δz = z²·δ(1/z)
-            noise_m: sigma / inverse_per_m.powi(2),
-            n: samples.len(),
-            n_holes,
-        });
-        let reach = OUTLIER_SIGMAS * sigma.max(LEAST_NOISE_M * inverse_per_m.powi(2));
-        samples.retain(|s| off(s).abs() <= reach);
-    }
-    found
+fn patch(middle: Pixel, samples: &[[f64; 3]], n_holes: usize) -> Option<Patch> {
+    let first = Moments::of(samples.first()?[2], samples, |_| true);
+    let plane = first.plane()?;
+    let Plane { at: [x, y, w], slope: [b, c], sigma } = plane;
+    let reach = OUTLIER_SIGMAS * sigma.max(LEAST_NOISE_M * w.powi(2));
+    let near = |s: &[f64; 3]| (s[2] - w - b * (s[0] - x) - c * (s[1] - y)).abs() <= reach;
+    let second = Moments::of(w, samples, near);
+    let Plane { at: [x, y, inverse_per_m], sigma, .. } = second.plane()?;
+    Some(Patch {
+        at: Pixel::new(middle.x + x, middle.y + y),
+        inverse_per_m,
+        // δz = z²·δ(1/z)
+        noise_m: sigma / inverse_per_m.powi(2),
+        n: second.n as usize,
+        n_holes,
+    })
 }
 
-/// `None` for fewer than 8 samples or samples on one line.
-fn fit_plane(samples: &[[f64; 3]]) -> Option<[f64; 3]> {
-    if samples.len() < 8 {
-        return None;
-    }
-    let n = samples.len() as f64;
-    let mut mean = [0.0; 3];
-    for s in samples {
-        for (mean, value) in mean.iter_mut().zip(s) {
-            *mean += value / n;
+/// Sums over samples (x, y, w), w from a value near all of them: what is squared is small.
+struct Moments {
+    origin: f64,
+    n: f64,
+    sum: [f64; 3],
+    /// xx xy yy xw yw ww
+    products: [f64; 6],
+}
+
+/// A plane w = at[2] + slope[0]·(x − at[0]) + slope[1]·(y − at[1]), and the σ of samples about it.
+struct Plane {
+    at: [f64; 3],
+    slope: [f64; 2],
+    sigma: f64,
+}
+
+impl Moments {
+    fn of(origin: f64, samples: &[[f64; 3]], counts: impl Fn(&[f64; 3]) -> bool) -> Self {
+        let mut moments = Self { origin, n: 0.0, sum: [0.0; 3], products: [0.0; 6] };
+        for sample in samples {
+            // Multiplied by 0 instead of passed over: no branch that depends on noise.
+            let share = f64::from(u8::from(counts(sample)));
+            let [x, y, w] = [sample[0], sample[1], sample[2] - origin];
+            let of = [share * x, share * y, share * w];
+            moments.n += share;
+            for (sum, value) in moments.sum.iter_mut().zip(of) {
+                *sum += value;
+            }
+            let products = [of[0] * x, of[0] * y, of[1] * y, of[0] * w, of[1] * w, of[2] * w];
+            for (sum, value) in moments.products.iter_mut().zip(products) {
+                *sum += value;
+            }
         }
+        moments
     }
-    let [mut xx, mut xy, mut yy, mut xw, mut yw] = [0.0; 5];
-    for s in samples {
-        let [x, y, w] = [s[0] - mean[0], s[1] - mean[1], s[2] - mean[2]];
-        xx += x * x;
-        xy += x * y;
-        yy += y * y;
-        xw += x * w;
-        yw += y * w;
+
+    /// `None` for fewer than 8 samples or samples on one line.
+    fn plane(&self) -> Option<Plane> {
+        if self.n < 8.0 {
+            return None;
+        }
+        let mean = self.sum.map(|sum| sum / self.n);
+        let about = |i: usize, j: usize, product: f64| product - self.n * mean[i] * mean[j];
+        let [xx, xy, yy, xw, yw, ww] = self.products;
+        let (xx, xy, yy) = (about(0, 0, xx), about(0, 1, xy), about(1, 1, yy));
+        let (xw, yw, ww) = (about(0, 2, xw), about(1, 2, yw), about(2, 2, ww));
+        let determinant = xx * yy - xy * xy;
+        if !(determinant > 1e-6 * xx * yy) {
+            return None;
+        }
+        let slope = [(yy * xw - xy * yw) / determinant, (xx * yw - xy * xw) / determinant];
+        let squares = ww - slope[0] * xw - slope[1] * yw;
+        Some(Plane {
+            at: [mean[0], mean[1], self.origin + mean[2]],
+            slope,
+            sigma: (squares.max(0.0) / (self.n - 3.0)).sqrt(),
+        })
     }
-    let determinant = xx * yy - xy * xy;
-    if !(determinant > 1e-6 * xx * yy) {
-        return None;
-    }
-    let b = (yy * xw - xy * yw) / determinant;
-    let c = (xx * yw - xy * xw) / determinant;
-    Some([mean[2] - b * mean[0] - c * mean[1], b, c])
 }

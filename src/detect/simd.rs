@@ -5,18 +5,7 @@ use std::{
     ops::{AddAssign, Mul},
 };
 
-use fearless_simd::{Level, dispatch};
-
-/// Runs `kernel` in a copy compiled for the widest vectors that this processor has: the compiler makes vectors of its
-/// plain loops.
-///
-/// The kernel and what it calls in its loops must be `#[inline(always)]`, or they are compiled for the oldest
-/// processor after all. Results are the same on all processors: the order of floating-point operations is kept, and
-/// none are fused.
-#[inline(always)]
-pub(super) fn vectorized<R>(kernel: impl FnOnce() -> R) -> R {
-    dispatch!(Level::new(), _simd => kernel())
-}
+pub(super) use crate::solve::vectorized;
 
 /// Σ a·b of two slices of one length, in eight sums that the compiler makes vectors of.
 #[inline(always)]

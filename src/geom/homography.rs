@@ -1,6 +1,6 @@
 //! Plane-to-plane projective maps.
 
-use nalgebra::{DMatrix, Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::Pixel;
 
@@ -50,34 +50,33 @@ impl Homography {
         let (from_norm, tf) = normalised(from)?;
         let (to_norm, tt) = normalised(to)?;
         // Normal equations of the 2n x 9 system: 9x9, its smallest eigenvector is h. Normalised coordinates are of
-        // order one, so squaring the condition number is harmless here.
-        let mut ata = SMatrix::<f64, 9, 9>::zeros();
+        // order one, so squaring the condition number is harmless here. With P = p·pᵀ for p = (x, y, 1) and q = (u, v):
+        //
+        //   ⎡  ΣP     0   −ΣuP      ⎤
+        //   ⎢   0    ΣP   −ΣvP      ⎥
+        //   ⎣ −ΣuP −ΣvP  Σ(u²+v²)P  ⎦
+        let mut sums = [Matrix3::<f64>::zeros(); 4];
         for (p, q) in from_norm.iter().zip(&to_norm) {
-            let r1 = SVector::<f64, 9>::from_column_slice(&[
-                p.x,
-                p.y,
-                1.0,
-                0.0,
-                0.0,
-                0.0,
-                -q.x * p.x,
-                -q.x * p.y,
-                -q.x,
-            ]);
-            let r2 = SVector::<f64, 9>::from_column_slice(&[
-                0.0,
-                0.0,
-                0.0,
-                p.x,
-                p.y,
-                1.0,
-                -q.y * p.x,
-                -q.y * p.y,
-                -q.y,
-            ]);
-            ata += r1 * r1.transpose() + r2 * r2.transpose();
+            let p = Vector3::new(p.x, p.y, 1.0);
+            let outer = p * p.transpose();
+            for (sum, by) in sums.iter_mut().zip([1.0, -q.x, -q.y, q.x * q.x + q.y * q.y]) {
+                *sum += outer * by;
+            }
         }
-        let eigen = DMatrix::from_column_slice(9, 9, ata.as_slice()).symmetric_eigen();
+        let [plain, by_u, by_v, by_both] = sums;
+        let mut ata = SMatrix::<f64, 9, 9>::zeros();
+        for (row, column, block) in [
+            (0, 0, plain),
+            (3, 3, plain),
+            (6, 0, by_u),
+            (0, 6, by_u),
+            (6, 3, by_v),
+            (3, 6, by_v),
+            (6, 6, by_both),
+        ] {
+            ata.fixed_view_mut::<3, 3>(row, column).copy_from(&block);
+        }
+        let eigen = ata.symmetric_eigen();
         let mut order: Vec<usize> = (0..9).collect();
         order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
         if eigen.eigenvalues[order[1]] < 1e-12 * eigen.eigenvalues[order[8]] {

@@ -148,36 +148,7 @@ impl View {
         corners: &[Corner],
         weighting: Weighting,
     ) -> Result<Self, Error> {
-        let n_corners = corners.len();
-        if n_corners < 4 {
-            return Err(Error::TooFewCorners { frame, n_corners });
-        }
-        let mut points = Vec::with_capacity(n_corners);
-        let mut rays = Vec::with_capacity(n_corners);
-        let mut sightings = Vec::with_capacity(n_corners);
-        for corner in corners {
-            let &Corner { id, pixel, .. } = corner;
-            if id >= board.n_corners() {
-                return Err(Error::UnknownCorner { frame, id, n_corners: board.n_corners() });
-            }
-            let outside = || Error::OutsideCamera { frame, id, x_px: pixel.x, y_px: pixel.y };
-            let ray = camera.unproject(pixel).filter(|r| r[0].is_finite() && r[1].is_finite());
-            rays.push(ray.ok_or_else(outside)?);
-            let point = board.corner(id);
-            points.push(point);
-            sightings.push(refine::Sighting { point, pixel, weight: weighting.weight(corner) });
-        }
-        let starts =
-            planar::both_poses(&points, &rays).ok_or(Error::Collinear { frame, n_corners })?;
-        let mut best: Option<(Pose<Color, Board>, f64)> = None;
-        for start in starts {
-            let Some((pose, cost)) = refine::refine(camera, &sightings, start) else { continue };
-            let in_front = points.iter().all(|&point| (pose * point).z() > 0.0);
-            if in_front && best.as_ref().is_none_or(|(_, least)| cost < *least) {
-                best = Some((pose, cost));
-            }
-        }
-        let (pose, _) = best.ok_or(Error::BehindCamera { frame, n_corners })?;
+        let pose = pose_of(frame, board, camera, corners, weighting, Polish::Full)?;
         Self::at_pose(frame, board, camera, corners, pose)
     }
 
@@ -225,6 +196,81 @@ impl View {
         let normal = self.color_from_board.rotation * Vector3::z();
         normal.z.abs().min(1.0).acos()
     }
+}
+
+/// How well a pose has to be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Polish {
+    /// At its minimum.
+    Full,
+    /// Near it: something else goes on from there.
+    Start,
+}
+
+/// The sum of squares is good to this share, and the pose to 1e-5 of its σ.
+const FULL_TOLERANCE: f64 = 1e-10;
+
+/// As `FULL_TOLERANCE`, where a larger problem goes on from there.
+const START_TOLERANCE: f64 = 1e-3;
+
+/// A pose near the one of [`View::from_corners`], for half its time: a start for something larger. Of two poses that
+/// explain the corners it is the same one.
+///
+/// Errors: as there.
+pub(crate) fn start(
+    frame: usize,
+    board: &CharucoBoard,
+    camera: &Camera,
+    corners: &[Corner],
+    weighting: Weighting,
+) -> Result<Pose<Color, Board>, Error> {
+    pose_of(frame, board, camera, corners, weighting, Polish::Start)
+}
+
+fn pose_of(
+    frame: usize,
+    board: &CharucoBoard,
+    camera: &Camera,
+    corners: &[Corner],
+    weighting: Weighting,
+    polish: Polish,
+) -> Result<Pose<Color, Board>, Error> {
+    let n_corners = corners.len();
+    if n_corners < 4 {
+        return Err(Error::TooFewCorners { frame, n_corners });
+    }
+    let mut points = Vec::with_capacity(n_corners);
+    let mut rays = Vec::with_capacity(n_corners);
+    let mut sightings = Vec::with_capacity(n_corners);
+    for corner in corners {
+        let &Corner { id, pixel, .. } = corner;
+        if id >= board.n_corners() {
+            return Err(Error::UnknownCorner { frame, id, n_corners: board.n_corners() });
+        }
+        let outside = || Error::OutsideCamera { frame, id, x_px: pixel.x, y_px: pixel.y };
+        let ray = camera.unproject(pixel).filter(|r| r[0].is_finite() && r[1].is_finite());
+        rays.push(ray.ok_or_else(outside)?);
+        let point = board.corner(id);
+        points.push(point);
+        sightings.push(refine::Sighting { point, pixel, weight: weighting.weight(corner) });
+    }
+    let starts = planar::both_poses(&points, &rays).ok_or(Error::Collinear { frame, n_corners })?;
+    let cost_tolerance = match polish {
+        Polish::Start if starts.len() == 1 => START_TOLERANCE,
+        Polish::Start | Polish::Full => FULL_TOLERANCE,
+    };
+    let mut best: Option<(Pose<Color, Board>, f64)> = None;
+    for start in starts {
+        let Some((pose, cost)) = refine::refine(camera, &sightings, start, cost_tolerance) else {
+            continue;
+        };
+        let in_front = points.iter().all(|&point| (pose * point).z() > 0.0);
+        if in_front && best.as_ref().is_none_or(|(_, least)| cost < *least) {
+            best = Some((pose, cost));
+        }
+    }
+    let (pose, _) = best.ok_or(Error::BehindCamera { frame, n_corners })?;
+    Ok(pose)
 }
 
 #[cfg(test)]

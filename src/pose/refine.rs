@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use crate::{
     camera::Camera,
     geom::{Board, Color, Pixel, Point, Pose, Rotation},
-    solve::{Arrow, BlockNormal, Bordered, BySchur, Effort, minimize},
+    solve::{Arrow, BlockNormal, Bordered, BySchur, Effort, Row, minimize, vectorized},
 };
 
 /// A board point, where it was seen, and the weight of both its residuals.
@@ -32,19 +32,31 @@ impl Bordered<0, 6> for Reprojection<'_> {
         pose: &Self::Block,
         normal: &mut BlockNormal<0, 6>,
     ) -> bool {
-        for sighting in self.sightings {
-            let turned = pose.rotation * sighting.point.coords;
-            let point: Point<Color> = Point::from_coords(turned + pose.translation);
-            let Some((pixel, by_point)) = self.camera.project_with_jacobian(point) else {
-                return false;
-            };
-            let residual = sighting.pixel - pixel;
-            for (r, d) in residual.into_iter().zip(by_point) {
-                normal.add_row(sighting.weight, r, &[], &d_pixel_d_pose(d, &turned));
-                normal.add_cost(0.5 * sighting.weight * r * r);
-            }
-        }
-        true
+        vectorized(
+            #[inline(always)]
+            || {
+                for pair in self.sightings.chunks(2) {
+                    let mut rows = [Row::ZERO; 4];
+                    for (sighting, rows) in pair.iter().zip(rows.as_chunks_mut::<2>().0) {
+                        let turned = pose.rotation * sighting.point.coords;
+                        let point: Point<Color> = Point::from_coords(turned + pose.translation);
+                        let Some((pixel, by_point)) = self.camera.project_with_jacobian(point)
+                        else {
+                            return false;
+                        };
+                        let weight = sighting.weight;
+                        let residual = sighting.pixel - pixel;
+                        for ((r, d), row) in residual.into_iter().zip(by_point).zip(rows) {
+                            let d_block = d_pixel_d_pose(d, &turned);
+                            *row = Row { weight, residual: r, d_shared: [], d_block };
+                            normal.add_cost(0.5 * weight * r * r);
+                        }
+                    }
+                    normal.add_rows(&rows);
+                }
+                true
+            },
+        )
     }
 
     fn advance_block(&self, pose: &Self::Block, step: &[f64; 6]) -> Self::Block {
@@ -56,6 +68,7 @@ impl Bordered<0, 6> for Reprojection<'_> {
 /// `turned` is the board point after the rotation alone.
 ///
 /// A step (ω, τ) moves the pose to (exp(ω)·R, t + τ): ∂p/∂ω·δ = δ × turned, so that d·(δ × turned) = δ·(turned × d).
+#[inline(always)]
 pub fn d_pixel_d_pose(by_point: [f64; 3], turned: &Vector3<f64>) -> [f64; 6] {
     let [a, b, c] = by_point;
     [turned.y * c - turned.z * b, turned.z * a - turned.x * c, turned.x * b - turned.y * a, a, b, c]
@@ -76,15 +89,16 @@ pub fn advance(pose: &Pose<Color, Board>, step: &[f64; 6]) -> Pose<Color, Board>
     )
 }
 
-/// The nearest minimum from `start` and its weighted sum of squares; `None` where `start` does not project.
+/// The nearest minimum from `start`, to this share of the sum of squares, and its weighted sum of squares; `None` where `start` does not project.
 pub(super) fn refine(
     camera: &Camera,
     sightings: &[Sighting],
     start: Pose<Color, Board>,
+    cost_tolerance: f64,
 ) -> Option<(Pose<Color, Board>, f64)> {
     let problem = Reprojection { camera, sightings };
     let start = Arrow { shared: [], loose: Vec::new(), blocks: vec![start] };
-    let effort = Effort { cost_tolerance: 1e-10, ..Effort::default() };
+    let effort = Effort { cost_tolerance, ..Effort::default() };
     let minimum = minimize(&BySchur(&problem), start, effort)?;
     Some((minimum.state.blocks[0], 2.0 * minimum.cost))
 }

@@ -60,6 +60,6 @@ pub use next::Typed;
 pub use overlay::Overlay;
 pub use paper::{PaperPictures, check_cells, paper_page};
 pub use photo::{Photo, PhotoSize};
-pub use pictures::{Closeup, Pictures};
+pub use pictures::{Closeup, Pictures, Thumbnails};
 pub use sheet::{sheet_image, sheet_pdf, sheet_png, sheet_svg};
 pub use text::{Line, Overview, Span, Tone, overview, summary};

@@ -76,21 +76,24 @@ fn shrunk(image: &Rgb, max_width: usize) -> Rgb {
         return image.clone();
     }
     let mut pixels = Vec::with_capacity(width * height);
+    // Sums along a row of blocks: memory is read once, in order.
+    let mut sums = vec![[0u32; 3]; width];
+    let columns = (width * factor).min(image.width());
     for y in 0..height {
-        for x in 0..width {
-            let mut sum = [0u32; 3];
-            let mut count = 0;
-            for row in y * factor..((y + 1) * factor).min(image.height()) {
-                let row = &image.pixels()[row * image.width()..][..image.width()];
-                for pixel in &row[x * factor..((x + 1) * factor).min(image.width())] {
+        sums.fill([0; 3]);
+        let rows = y * factor..((y + 1) * factor).min(image.height());
+        for row in rows.clone() {
+            let row = &image.pixels()[row * image.width()..][..columns];
+            for (block, sum) in row.chunks(factor).zip(&mut sums) {
+                for pixel in block {
                     for (sum, channel) in sum.iter_mut().zip(pixel) {
                         *sum += u32::from(*channel);
                     }
-                    count += 1;
                 }
             }
-            pixels.push(sum.map(|sum| ((sum + count / 2) / count) as u8));
         }
+        let count = (rows.len() * factor.min(columns)) as u32;
+        pixels.extend(sums.iter().map(|sum| sum.map(|sum| ((sum + count / 2) / count) as u8)));
     }
     Rgb::new(width, height, pixels)
 }

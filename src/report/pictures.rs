@@ -1,9 +1,14 @@
 //! What a page shows of the recording itself: photos of its frames, and a few frames with their depth.
 
+use std::{
+    collections::BTreeMap,
+    sync::{Mutex, PoisonError},
+};
+
 use super::photo::{Photo, PhotoSize, base64};
 use crate::{
     audit::{Audit, FrameAudit},
-    image::DepthMap,
+    image::{DepthMap, Rgb},
     recording::{self, Recording},
 };
 
@@ -66,6 +71,25 @@ impl Closeup {
     }
 }
 
+/// Small photos made while an audit looks at the images, so that these need not be decoded again.
+#[derive(Debug)]
+pub struct Thumbnails(Mutex<BTreeMap<usize, Photo>>, bool);
+
+impl Thumbnails {
+    /// For this recording. One so long that its page shows a spread only gets none: most would be made for nothing.
+    pub fn new(recording: &Recording) -> Self {
+        Self(Mutex::default(), recording.frames.len() <= MAX_PHOTOS)
+    }
+
+    /// Keeps a small photo of this frame. From any thread.
+    pub fn see(&self, frame: usize, image: &Rgb) {
+        if self.1 {
+            let photo = Photo::new(frame, image, PhotoSize::Small);
+            self.0.lock().unwrap_or_else(PoisonError::into_inner).insert(frame, photo);
+        }
+    }
+}
+
 impl Pictures {
     /// Reads what a page of this audit shows, on all cores where the feature `parallel` is on: every frame small (of
     /// more than 60 a spread), twelve of them large (the four whose view fits worst, the frame with the fewest corners,
@@ -73,8 +97,23 @@ impl Pictures {
     ///
     /// Errors: as [`Recording::rgb`] and [`Recording::depth`], of the first frame that has one.
     pub fn read(recording: &Recording, audit: &Audit) -> Result<Self, recording::Error> {
+        Self::read_beside(recording, audit, Thumbnails::new(recording))
+    }
+
+    /// As [`read`](Self::read), with the small photos that there are already.
+    ///
+    /// Errors: as there.
+    pub fn read_beside(
+        recording: &Recording,
+        audit: &Audit,
+        thumbnails: Thumbnails,
+    ) -> Result<Self, recording::Error> {
         let choice = Choice::new(audit);
+        let made = thumbnails.0.into_inner().unwrap_or_else(PoisonError::into_inner);
         let photo = |&frame: &usize| {
+            if let (Some(photo), false) = (made.get(&frame), choice.large.contains(&frame)) {
+                return Ok(photo.clone());
+            }
             let size =
                 if choice.large.contains(&frame) { PhotoSize::Large } else { PhotoSize::Small };
             Ok(Photo::new(frame, &recording.rgb(frame)?, size))

@@ -5,6 +5,8 @@
     reason = "triangular loops over two indices read as the formulas do"
 )]
 
+use super::simd::{dot, vectorized};
+
 /// A symmetric positive definite matrix as L·Lᵀ.
 #[derive(Clone, Copy, Debug)]
 pub struct Cholesky<const N: usize> {
@@ -97,16 +99,23 @@ impl DenseCholesky {
     /// Factors an `n` by `n` matrix (row-major) given by its lower triangle; `None` where it is not positive definite
     /// within f64.
     pub fn new(matrix: Vec<f64>, n: usize) -> Option<Self> {
+        vectorized(
+            #[inline(always)]
+            || Self::factor(matrix, n),
+        )
+    }
+
+    #[inline(always)]
+    fn factor(matrix: Vec<f64>, n: usize) -> Option<Self> {
         let mut l = matrix;
         for i in 0..n {
             let (above, row) = l.split_at_mut(i * n);
             let whole = row[i];
             for j in 0..i {
                 let other = &above[j * n..j * n + j];
-                let dot: f64 = row[..j].iter().zip(other).map(|(a, b)| a * b).sum();
-                row[j] = (row[j] - dot) * above[j * n + j];
+                row[j] = (row[j] - dot(&row[..j], other)) * above[j * n + j];
             }
-            let pivot = whole - row[..i].iter().map(|x| x * x).sum::<f64>();
+            let pivot = whole - dot(&row[..i], &row[..i]);
             if !(pivot > 1e-14 * whole) {
                 return None;
             }
@@ -117,30 +126,44 @@ impl DenseCholesky {
 
     /// The solution x of L·Lᵀ·x = b.
     pub fn solve(&self, b: &[f64]) -> Vec<f64> {
-        let (l, n) = (&self.factor, self.n);
         let mut x = b.to_vec();
-        for i in 0..n {
-            let dot: f64 = l[i * n..i * n + i].iter().zip(&x).map(|(a, b)| a * b).sum();
-            x[i] = (x[i] - dot) * l[i * n + i];
+        vectorized(
+            #[inline(always)]
+            || self.solve_from(0, &mut x),
+        );
+        x
+    }
+
+    /// Solves in place, `x` being zero before `first`.
+    #[inline(always)]
+    fn solve_from(&self, first: usize, x: &mut [f64]) {
+        let (l, n) = (&self.factor, self.n);
+        for i in first..n {
+            let row = &l[i * n..i * n + i + 1];
+            x[i] = (x[i] - dot(&row[first..i], &x[first..i])) * row[i];
         }
         for i in (0..n).rev() {
             x[i] *= l[i * n + i];
             let (before, at) = x.split_at_mut(i);
             before.iter_mut().zip(&l[i * n..i * n + i]).for_each(|(b, a)| *b -= a * at[0]);
         }
-        x
     }
 
     /// (L·Lᵀ)⁻¹, row-major.
     pub fn inverse(&self) -> Vec<f64> {
         let n = self.n;
         let mut inverse = vec![0.0; n * n];
-        for j in 0..n {
-            let mut unit = vec![0.0; n];
-            unit[j] = 1.0;
-            // Symmetric: a column is a row.
-            inverse[j * n..(j + 1) * n].copy_from_slice(&self.solve(&unit));
-        }
+        vectorized(
+            #[inline(always)]
+            || {
+                for j in 0..n {
+                    // Symmetric: a column is a row.
+                    let row = &mut inverse[j * n..(j + 1) * n];
+                    row[j] = 1.0;
+                    self.solve_from(j, row);
+                }
+            },
+        );
         inverse
     }
 }

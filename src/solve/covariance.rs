@@ -1,6 +1,9 @@
 //! How sure shared parameters are, their blocks' own parameters marginalised.
 
-use super::{DenseCholesky, Reduced};
+use super::{
+    DenseCholesky, Reduced,
+    simd::{dot, vectorized},
+};
 
 /// The sum of what all blocks say.
 ///
@@ -47,16 +50,26 @@ impl<'a> Pooled<'a> {
     /// variance = Σ (qᵀ·scoreᵢ)²·tᵢ/vᵢ + qᵀ·prior·q
     /// ```
     pub fn clustered(&self, n_wanted: usize) -> Option<Vec<f64>> {
+        vectorized(
+            #[inline(always)]
+            || self.clustered_of(n_wanted),
+        )
+    }
+
+    #[inline(always)]
+    fn clustered_of(&self, n_wanted: usize) -> Option<Vec<f64>> {
         let n = self.n;
         let mut variances = Vec::with_capacity(n_wanted);
+        let (mut sq, mut rsq) = (vec![0.0; n], vec![0.0; n]);
         for wanted in 0..n_wanted {
             let q = &self.inverse[wanted * n..(wanted + 1) * n];
             let mut sum = 0.0;
             let mut from_parts = 0.0;
             for part in self.parts {
-                let sq = times(&part.information, q);
+                times(&part.information, q, &mut sq);
                 let t = dot(q, &sq);
-                let v = t - dot(&sq, &times(&self.inverse, &sq));
+                times(&self.inverse, &sq, &mut rsq);
+                let v = t - dot(&sq, &rsq);
                 if t > 0.0 {
                     if !(v > 1e-9 * t) {
                         return None; // This part alone determines the parameter: nothing to compare it with.
@@ -86,7 +99,9 @@ impl<'a> Pooled<'a> {
             return None;
         }
         let minus = DenseCholesky::new(others, n)?.solve(&part.score);
-        let rise = 2.0 * dot(&part.score, &minus) + dot(&minus, &times(&part.information, &minus));
+        let mut own = vec![0.0; n];
+        times(&part.information, &minus, &mut own);
+        let rise = 2.0 * dot(&part.score, &minus) + dot(&minus, &own);
         Some(LeftOut { shift: minus.into_iter().map(|x| -x).collect(), rise })
     }
 }
@@ -118,13 +133,12 @@ pub fn larger(covariance: &[f64], variances: &[f64]) -> Vec<f64> {
     (0..n * n).map(|at| covariance[at] * factor[at / n] * factor[at % n]).collect()
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
-}
-
 /// A square matrix (row-major) times a vector.
-fn times(matrix: &[f64], x: &[f64]) -> Vec<f64> {
-    matrix.chunks(x.len().max(1)).map(|row| dot(row, x)).collect()
+#[inline(always)]
+fn times(matrix: &[f64], x: &[f64], product: &mut [f64]) {
+    for (row, product) in matrix.chunks(x.len().max(1)).zip(product) {
+        *product = dot(row, x);
+    }
 }
 
 #[cfg(test)]

@@ -53,15 +53,18 @@ impl Default for Effort {
 pub struct Minimum<S, N> {
     /// The state.
     pub state: S,
-    /// The normal equations there.
+    /// The normal equations there, to within the last step, which the tolerance did not ask for.
     pub normal: N,
-    /// Half the (robust) sum of squares there.
+    /// Half the (robust) sum of squares before that last step.
     pub cost: f64,
     /// Linearisations made.
     pub n_iterations: usize,
     /// False where the iterations ran out first.
     pub converged: bool,
 }
+
+/// A step damped by less is the undamped one for what any camera can know.
+const SLIGHT_DAMPING: f64 = 1e-10;
 
 /// The least cost downhill from `start`; `None` where `start` lies outside the problem's domain.
 ///
@@ -93,6 +96,16 @@ pub fn minimize<P: LeastSquares>(
             continue;
         };
         if !(predicted_decrease > effort.cost_tolerance * cost) {
+            // Damping makes small promises where little is known: only nearly undamped ones count.
+            if damping > SLIGHT_DAMPING {
+                damping = SLIGHT_DAMPING;
+                n_iterations += 1;
+                continue;
+            }
+            // The last step costs nothing but itself, and leaves its own square as the error.
+            if predicted_decrease > 0.0 {
+                state = problem.advance(&state, &step);
+            }
             converged = true;
             break;
         }

@@ -43,6 +43,8 @@
 //!
 //! Not here: cameras, poses, pixels; large or sparse systems of other shapes.
 
+mod simd;
+
 mod stats;
 
 mod loss;
@@ -59,5 +61,6 @@ pub use cholesky::{Cholesky, DenseCholesky};
 pub use covariance::{LeftOut, Pooled, larger, total};
 pub use lm::{Effort, LeastSquares, Minimum, Solution, minimize};
 pub use loss::Loss;
-pub use schur::{Arrow, ArrowNormal, BlockNormal, Bordered, BySchur, Reduced, Response};
+pub use schur::{Arrow, ArrowNormal, BlockNormal, Bordered, BySchur, Reduced, Response, Row};
+pub(crate) use simd::vectorized;
 pub use stats::{mad_sigma, mean, median, quantile, rms, standard_deviation, standard_error};

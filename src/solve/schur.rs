@@ -5,7 +5,7 @@
     reason = "index loops over small matrices read as the formulas do"
 )]
 
-use super::{Cholesky, DenseCholesky, LeastSquares, Solution};
+use super::{Cholesky, DenseCholesky, LeastSquares, Solution, simd::vectorized};
 
 /// A least-squares problem of `S` shared parameters, any number of *loose* ones, and any number of blocks of `B`
 /// parameters each: a residual depends on the shared parameters, on one block, and on one loose parameter at most.
@@ -48,7 +48,7 @@ pub trait Bordered<const S: usize, const B: usize> {
     fn advance_block(&self, block: &Self::Block, step: &[f64; B]) -> Self::Block;
 }
 
-/// What one block contributes to the normal equations. Matrices hold their lower triangle.
+/// What one block contributes to the normal equations. Of symmetric matrices the lower triangle counts.
 #[derive(Clone, Debug)]
 pub struct BlockNormal<const S: usize, const B: usize> {
     /// U: shared by shared.
@@ -77,6 +77,25 @@ struct Loose<const S: usize, const B: usize> {
     right: f64,
 }
 
+/// A residual (observed − predicted), its weight in the sum of squares, and the derivatives of the *prediction*.
+#[derive(Clone, Copy, Debug)]
+pub struct Row<const S: usize, const B: usize> {
+    /// In the sum of squares.
+    pub weight: f64,
+    /// Observed − predicted.
+    pub residual: f64,
+    /// By the shared parameters.
+    pub d_shared: [f64; S],
+    /// By those of the block.
+    pub d_block: [f64; B],
+}
+
+impl<const S: usize, const B: usize> Row<S, B> {
+    /// Says nothing.
+    pub const ZERO: Self =
+        Self { weight: 0.0, residual: 0.0, d_shared: [0.0; S], d_block: [0.0; B] };
+}
+
 impl<const S: usize, const B: usize> BlockNormal<S, B> {
     /// Nothing added yet.
     pub const ZERO: Self = Self {
@@ -93,34 +112,53 @@ impl<const S: usize, const B: usize> BlockNormal<S, B> {
     /// weight. The cost is added apart, by [`add_cost`](Self::add_cost).
     #[inline]
     pub fn add_row(&mut self, weight: f64, residual: f64, d_shared: &[f64; S], d_block: &[f64; B]) {
-        let weighted = weight * residual;
+        self.add_rows(&[Row { weight, residual, d_shared: *d_shared, d_block: *d_block }]);
+    }
+
+    /// Adds several residuals at once: the sums go through memory once for all of them.
+    #[inline(always)]
+    pub fn add_rows<const R: usize>(&mut self, rows: &[Row<S, B>; R]) {
         for i in 0..B {
-            let row = weight * d_block[i];
-            for j in 0..=i {
-                self.v[i][j] += row * d_block[j];
+            let mut sum = self.v[i];
+            let mut right = self.h[i];
+            for row in rows {
+                let weighted = row.weight * row.d_block[i];
+                for j in 0..B {
+                    sum[j] += weighted * row.d_block[j];
+                }
+                right += weighted * row.residual;
             }
-            self.h[i] += weighted * d_block[i];
+            self.v[i] = sum;
+            self.h[i] = right;
         }
         for i in 0..S {
-            let row = weight * d_shared[i];
-            for j in 0..B {
-                self.w[i][j] += row * d_block[j];
+            let mut by_block = self.w[i];
+            let mut sum = self.u[i];
+            let mut right = self.g[i];
+            for row in rows {
+                let weighted = row.weight * row.d_shared[i];
+                for j in 0..B {
+                    by_block[j] += weighted * row.d_block[j];
+                }
+                for j in 0..S {
+                    sum[j] += weighted * row.d_shared[j];
+                }
+                right += weighted * row.residual;
             }
-            for j in 0..=i {
-                self.u[i][j] += row * d_shared[j];
-            }
-            self.g[i] += weighted * d_shared[i];
+            self.w[i] = by_block;
+            self.u[i] = sum;
+            self.g[i] = right;
         }
     }
 
-    /// The derivative of the row just added by a loose parameter. Rows of the same parameter come one after another.
-    #[inline]
-    pub fn add_loose(
-        &mut self,
-        (weight, residual): (f64, f64),
-        (d_shared, d_block): (&[f64; S], &[f64; B]),
-        (parameter, d_loose): (usize, f64),
-    ) {
+    /// Room for so many loose parameters.
+    pub fn reserve_loose(&mut self, n: usize) {
+        self.loose.reserve(n);
+    }
+
+    /// The derivative of a row just added by a loose parameter. Rows of the same parameter come one after another.
+    #[inline(always)]
+    pub fn add_loose(&mut self, row: &Row<S, B>, (parameter, d_loose): (usize, f64)) {
         if self.loose.last().is_none_or(|last| last.parameter != parameter) {
             self.loose.push(Loose {
                 parameter,
@@ -131,15 +169,15 @@ impl<const S: usize, const B: usize> BlockNormal<S, B> {
             });
         }
         let Some(loose) = self.loose.last_mut() else { return };
-        let row = weight * d_loose;
+        let weighted = row.weight * d_loose;
         for i in 0..S {
-            loose.by_shared[i] += row * d_shared[i];
+            loose.by_shared[i] += weighted * row.d_shared[i];
         }
         for i in 0..B {
-            loose.by_block[i] += row * d_block[i];
+            loose.by_block[i] += weighted * row.d_block[i];
         }
-        loose.by_itself += row * d_loose;
-        loose.right += row * residual;
+        loose.by_itself += weighted * d_loose;
+        loose.right += weighted * row.residual;
     }
 
     /// Adds to the cost: half of ρ.
@@ -156,6 +194,14 @@ impl<const S: usize, const B: usize> BlockNormal<S, B> {
     /// Adds this block, eliminated at this damping, to the equations of the shared and loose parameters (lower
     /// triangle); `None` where its own parameters are not determined.
     fn eliminate(&self, damping: f64, into: &mut Reduced) -> Option<Eliminated<B>> {
+        vectorized(
+            #[inline(always)]
+            || self.eliminated(damping, into),
+        )
+    }
+
+    #[inline(always)]
+    fn eliminated(&self, damping: f64, into: &mut Reduced) -> Option<Eliminated<B>> {
         let mut v = self.v;
         for i in 0..B {
             v[i][i] *= 1.0 + damping;
@@ -181,9 +227,23 @@ impl<const S: usize, const B: usize> BlockNormal<S, B> {
             into.information[i * n + i] += (1.0 + damping) * loose.by_itself;
             into.score[i] += loose.right;
         }
+        // The products of one row with all before it, side by side; then each to its place.
+        let mut columns = vec![0.0; B * rows.len()];
+        for (a, (_, y)) in rows.iter().enumerate() {
+            for k in 0..B {
+                columns[k * rows.len() + a] = y[k];
+            }
+        }
+        let mut dots = vec![0.0; rows.len()];
         for (a, (i, y)) in rows.iter().enumerate() {
-            for (j, other) in &rows[..=a] {
-                let dot: f64 = (0..B).map(|k| y[k] * other[k]).sum();
+            let dots = &mut dots[..=a];
+            dots.fill(0.0);
+            for k in 0..B {
+                for (dot, other) in dots.iter_mut().zip(&columns[k * rows.len()..]) {
+                    *dot += y[k] * other;
+                }
+            }
+            for ((j, _), dot) in rows.iter().zip(&*dots) {
                 into.information[i.max(j) * n + i.min(j)] -= dot;
             }
             let dot: f64 = (0..B).map(|k| y[k] * z[k]).sum();
@@ -440,10 +500,10 @@ mod tests {
                 let bump = bump.copied().unwrap_or(0.0);
                 let residual = y - (a * e + b + c * t * t * (1.0 + bump));
                 let by_shared = [-t * a * e, t * t * (1.0 + bump)];
-                normal.add_row(1.0, residual, &by_shared, &[e, 1.0]);
+                let row = Row { weight: 1.0, residual, d_shared: by_shared, d_block: [e, 1.0] };
+                normal.add_rows(&[row]);
                 if parameter.is_multiple_of(10) && !loose.is_empty() {
-                    let at = (parameter / 10, c * t * t);
-                    normal.add_loose((1.0, residual), (&by_shared, &[e, 1.0]), at);
+                    normal.add_loose(&row, (parameter / 10, c * t * t));
                 }
                 normal.add_cost(0.5 * residual * residual);
             }

@@ -6,9 +6,10 @@ use std::{
 };
 
 use truedepth::{
-    audit::{Audit, Method, Options, Progress, audit_observed},
+    audit::{Audit, Method, Options, Progress, Witness, audit_watched},
+    image::Rgb,
     recording::{Found, Recording},
-    report::{self, Overview, Pictures, Typed, wire},
+    report::{self, Overview, Pictures, Thumbnails, Typed, wire},
 };
 
 use crate::{
@@ -126,12 +127,14 @@ fn one(
     let folder = folder.map(ReportFolder::new).transpose()?;
     let recording = found.open()?;
     terminal.detail(&format!("{}: {} frames", recording.place(), recording.frames.len()));
-    let audit = observed(&recording, options, terminal)?;
+    let thumbnails = folder.as_ref().map(|_| Thumbnails::new(&recording));
+    let audit = watched(&recording, options, thumbnails.as_ref(), terminal)?;
     let json = report::to_json(&wire::Document::Audit(Box::new(wire::Audit::from(&audit))));
     let report = folder.as_ref().map(|folder| folder.json().display().to_string());
     let typed = Typed { recording: recording_typed, report };
-    if let Some(folder) = &folder {
-        folder.write(&json, &page(&recording, &audit, &typed)?)?;
+    if let (Some(folder), Some(thumbnails)) = (&folder, thumbnails) {
+        let pictures = Pictures::read_beside(&recording, &audit, thumbnails)?;
+        folder.write(&json, &report::page(&audit, &pictures, &typed))?;
     }
     if args.json {
         terminal.result(&json)?;
@@ -154,12 +157,25 @@ pub(crate) fn observed(
     options: &Options,
     terminal: &Terminal,
 ) -> Result<Audit, Failure> {
+    watched(recording, options, None, terminal)
+}
+
+/// The same; small photos are made on the way where they are wanted.
+fn watched(
+    recording: &Recording,
+    options: &Options,
+    thumbnails: Option<&Thumbnails>,
+    terminal: &Terminal,
+) -> Result<Audit, Failure> {
     let bar = terminal.progress(&recording.name, recording.frames.len());
-    let audit = audit_observed(recording, options, &|Progress { stage, done, total }| {
+    let observer = |Progress { stage, done, total }| {
         bar.set_message(format!("{}: {}", recording.name, stage.name()));
         bar.set_length(total as u64);
         bar.set_position(done as u64);
-    });
+    };
+    let see = thumbnails.map(|thumbnails| |frame, image: &Rgb| thumbnails.see(frame, image));
+    let witness = see.as_ref().map(|see| see as Witness<'_>);
+    let audit = audit_watched(recording, options, &observer, witness);
     bar.finish_and_clear();
     Ok(audit?)
 }
