@@ -405,6 +405,12 @@ pub(crate) struct CalibrateArgs {
     #[arg(long, requires = "model")]
     pub(crate) plain: bool,
 
+    /// Calibrate from at most so many views: of more, those that together tell most about the camera
+    ///
+    /// Of views that show the same picture one is taken before any gets a second. --method paper and --plain take all.
+    #[arg(long, value_name = "N", default_value_t = truedepth::calibrate::MAX_VIEWS, value_parser = at_least_three)]
+    pub(crate) views: usize,
+
     #[command(flatten)]
     pub(crate) input: InputArgs,
 
@@ -766,5 +772,13 @@ mod tests {
                 assert!(arg.get_help().is_some(), "{} {}", verb.get_name(), arg.get_id());
             }
         }
+    }
+}
+
+/// A number of views that can disagree.
+fn at_least_three(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(n) if n >= 3 => Ok(n),
+        _ => Err("a calibration takes at least 3 views: give a whole number from 3 on".to_owned()),
     }
 }

@@ -1,11 +1,12 @@
 //! The best of several models, by how well they predict pictures that took no part.
 
 use super::{
-    Candidate, Error, Estimate, Input, Model, Outlier, RejectedFrame, SurfaceCandidate,
+    Candidate, Chosen, Error, Estimate, Input, Model, Outlier, RejectedFrame, SurfaceCandidate,
     abreast::abreast,
     fit::{Data, Fit, Start, Wanted, fit},
     model::{Aspect, Center, Shape, Warp},
     problem::Measured,
+    select::most_telling,
     surface::{Form, Sheet, Surface},
     views::{self, MIN_CORNERS, all_usable},
     weigh::{drop_outliers, weigh},
@@ -35,6 +36,7 @@ pub(super) struct Prepared {
     pub(super) views: Vec<Measured>,
     pub(super) outliers: Vec<Outlier>,
     pub(super) rejected: Vec<RejectedFrame>,
+    pub(super) chosen: Option<Chosen>,
     pub(super) pictures: Vec<usize>,
     pub(super) sheet: Sheet,
     /// What is taken for known of the board's shape.
@@ -75,14 +77,20 @@ impl Prepared {
 /// Gathers all usable views; weighs their corners and finds outliers under a model that no lens of ours is far from
 /// (focal length, centre, k1, k2), so that what is left out does not depend on the model judged later; decides by
 /// held-out pictures (one-standard-error rule) what the board's shape is taken to be.
-pub(super) fn prepare(input: &Input<'_>) -> Result<Prepared, Error> {
+pub(super) fn prepare(input: &Input<'_>, max_views: usize) -> Result<Prepared, Error> {
     let weighting = Weighting::Sigma { floor_px: 0.1 };
-    let gathered = all_usable(input, MIN_CORNERS, weighting);
+    let mut gathered = all_usable(input, MIN_CORNERS, weighting);
     views::require(input, &gathered, MIN_PICTURES, MIN_CORNERS)?;
+    let choice = most_telling(input, &gathered.views, weighting, max_views.max(MIN_PICTURES));
+    let chosen = choice.map(|(indices, chosen)| {
+        gathered.keep_only(&indices);
+        chosen
+    });
     let mut prepared = Prepared {
         views: gathered.views,
         outliers: Vec::new(),
         rejected: gathered.rejected,
+        chosen,
         pictures: Vec::new(),
         sheet: Sheet::new(input.board),
         surface: Surface::Flat,

@@ -27,6 +27,22 @@ use crate::{
 /// Errors: too few usable views; views that do not determine the focal length to within 3 % (all straight on, or all
 /// the same); a model that needs tables without tables; factory intrinsics that make no camera.
 pub fn calibrate(input: &Input<'_>, method: Method) -> Result<Calibration, Error> {
+    calibrate_from(input, method, MAX_VIEWS)
+}
+
+/// From more views than this the most telling ones are chosen: σ shrinks with the root of their number at best, time
+/// grows with it, and a hand does not take so many different pictures.
+pub const MAX_VIEWS: usize = 120;
+
+/// As [`calibrate`], from `max_views` views at most: where there are more, those are chosen that together tell most
+/// about the camera, and [`Calibration::chosen`] says so. [`Method::Paper`] and [`Method::Plain`] take all.
+///
+/// Errors: as there.
+pub fn calibrate_from(
+    input: &Input<'_>,
+    method: Method,
+    max_views: usize,
+) -> Result<Calibration, Error> {
     let factory = input.factory;
     let positive = |f: f64| f > 0.0 && f.is_finite();
     if !(positive(factory.fx)
@@ -56,14 +72,14 @@ pub fn calibrate(input: &Input<'_>, method: Method) -> Result<Calibration, Error
         Method::Robust(model) => {
             let shape =
                 model.shape(input.tables, Surface::Flat).ok_or(Error::NoTables { model })?;
-            let prepared = auto::prepare(input)?;
+            let prepared = auto::prepare(input, max_views)?;
             let shape = Shape { surface: prepared.surface, ..shape };
             let fit = auto::fit_prepared(input, &prepared, shape)
                 .ok_or_else(|| auto::underdetermined(&prepared, None))?;
             robust(input, method, model, prepared, &fit, Vec::new())
         }
         Method::Auto | Method::Unaided => {
-            let prepared = auto::prepare(input)?;
+            let prepared = auto::prepare(input, max_views)?;
             let models = match method {
                 Method::Unaided => &Model::UNAIDED[..],
                 _ => &Model::SQUARE[..],
@@ -80,7 +96,7 @@ pub fn calibrate(input: &Input<'_>, method: Method) -> Result<Calibration, Error
 /// How much of the lens' distortion is left in the stream, as [`Method::Auto`] finds it beside its calibration; `None`
 /// where the views do not tell.
 pub fn distortion_test(input: &Input<'_>) -> Option<DistortionTest> {
-    distortion::test(input, &auto::prepare(input).ok()?)
+    distortion::test(input, &auto::prepare(input, MAX_VIEWS).ok()?)
 }
 
 /// The last step is smaller than 1e-4 σ, its error than the square of that.
@@ -113,6 +129,7 @@ fn plain(
         views,
         outliers: Vec::new(),
         rejected,
+        chosen: None,
         pictures,
         sheet,
         surface: Surface::Flat,
@@ -209,6 +226,7 @@ fn assemble(
         parameters,
         covariance,
         views,
+        chosen: prepared.chosen,
         n_pictures,
         rms_px: (squares / n_corners as f64).sqrt(),
         candidates,

@@ -53,6 +53,8 @@ mod fit;
 
 mod motion;
 
+mod select;
+
 mod views;
 
 mod weigh;
@@ -78,7 +80,7 @@ mod tests;
 
 pub use coverage::{Coverage, Tilt, coverage};
 pub use guess::guess_intrinsics;
-pub use job::{calibrate, distortion_test};
+pub use job::{MAX_VIEWS, calibrate, calibrate_from, distortion_test};
 pub use model::Model;
 pub use motion::{MeanMotion, ProjectionUncertainty};
 
@@ -147,6 +149,9 @@ pub struct Calibration {
     pub covariance: Vec<f64>,
     /// Views used, by frame, with the corners that took part; residuals against the board's `surface`.
     pub views: Vec<View>,
+    /// How the views were chosen where there were more than are worth their time; `None` where all usable ones took
+    /// part.
+    pub chosen: Option<Chosen>,
     /// How many different pictures these views are: views whose corners lie within 4 % of the image's width of each
     /// other count once.
     pub n_pictures: usize,
@@ -199,6 +204,19 @@ impl Calibration {
         self.parameter("focal_px")
             .unwrap_or(Estimate { value: self.camera.intrinsics.fx, sigma: f64::INFINITY })
     }
+}
+
+/// A choice of the most telling views.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Chosen {
+    /// Views that could have taken part.
+    pub n_usable: usize,
+    /// Views that did.
+    pub n_chosen: usize,
+    /// Different pictures among those that could have.
+    pub n_pictures: usize,
+    /// How many times the focal length's σ from corner noise is larger than it would have been with all of them.
+    pub focal_sigma_ratio: f64,
 }
 
 /// The shape of a board, as it is estimated with the camera.
@@ -381,6 +399,11 @@ pub enum Rejection {
     },
     /// No pose explains the corners.
     NoPose(crate::pose::Error),
+    /// Other views tell more ([`Chosen`]).
+    NotChosen {
+        /// How many views were chosen.
+        n_chosen: usize,
+    },
     /// The camera stood where it had stood before ([`Method::Paper`]).
     NearAccepted {
         /// The accepted frame.
@@ -399,13 +422,14 @@ pub enum Rejection {
 }
 
 impl Rejection {
-    /// `few_corners`, `narrow_corners`, `no_pose`, `near_accepted` or `disagrees`: stable, for machines.
+    /// `few_corners`, `narrow_corners`, `no_pose`, `near_accepted`, `not_chosen` or `disagrees`: stable, for machines.
     pub const fn name(&self) -> &'static str {
         match self {
             Self::FewCorners { .. } => "few_corners",
             Self::NarrowCorners { .. } => "narrow_corners",
             Self::NoPose(_) => "no_pose",
             Self::NearAccepted { .. } => "near_accepted",
+            Self::NotChosen { .. } => "not_chosen",
             Self::Disagrees { .. } => "disagrees",
         }
     }
@@ -426,6 +450,9 @@ impl fmt::Display for Rejection {
                 "the camera stood {:.0} mm from where it was in frame {accepted}; the paper skips views nearer than 40",
                 1e3 * distance_m
             ),
+            Self::NotChosen { n_chosen } => {
+                write!(f, "the {n_chosen} views that were chosen tell most of what it tells")
+            }
             Self::Disagrees { n_outliers, n_corners } => write!(
                 f,
                 "{n_outliers} of {n_corners} corners disagree with all other frames: another board, or it moved"

@@ -94,6 +94,13 @@ impl Sheet {
         sheet
     }
 
+    /// A board of which no free surface is asked.
+    pub(super) fn flat(board: &CharucoBoard) -> Self {
+        let half = [board.squares_x, board.squares_y].map(|n| 0.5 * n as f64 * board.square_m);
+        let sigma_m = SIGMA_SHARE * 2.0 * half[0].max(half[1]);
+        Self { center: half, half, sigma_m, precision: Vec::new(), corners: Vec::new() }
+    }
+
     /// Is the board small enough for this surface?
     pub(super) fn allows(&self, surface: Surface) -> bool {
         surface != Surface::Free || !self.precision.is_empty()

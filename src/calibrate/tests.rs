@@ -1,8 +1,8 @@
 //! The whole room on corners of known cameras.
 
 use super::{
-    Calibration, Error, Estimate, FrameCorners, Input, Lens, Method, Model, Rejection, SurfaceKind,
-    calibrate, coverage, guess_intrinsics,
+    Calibration, Error, Estimate, FrameCorners, Input, Lens, Method, Model, RejectedFrame,
+    Rejection, SurfaceKind, calibrate, calibrate_from, coverage, guess_intrinsics,
     synthetic::{FACTORY, Random, Scene, board, pose, tables},
 };
 use crate::{
@@ -410,4 +410,89 @@ fn projection_is_least_known_where_nothing_was_seen() {
     let focal = whole.focal_px();
     assert_eq!(whole.left_out.len(), whole.n_pictures);
     assert!(whole.left_out.iter().all(|l| (l.focal_px - focal.value).abs() < 3.0 * focal.sigma));
+}
+
+/// A recording of minutes: 300 views of which many are alike.
+fn long_recording(seed: u64) -> Vec<FrameCorners> {
+    let scene = Scene { n_views: 60, ..Scene::new(Distortion::None) };
+    let mut frames = scene.frames(seed);
+    // The hand rests: each view is seen five times, with noise of its own.
+    let mut random = Random(seed + 77);
+    let rests: Vec<FrameCorners> = frames
+        .iter()
+        .flat_map(|frame| std::iter::repeat_n(frame.clone(), 4))
+        .map(|mut frame| {
+            for corner in &mut frame.corners {
+                corner.pixel.x += 0.1 * random.normal();
+                corner.pixel.y += 0.1 * random.normal();
+            }
+            frame
+        })
+        .collect();
+    frames.extend(rests);
+    for (index, frame) in frames.iter_mut().enumerate() {
+        frame.frame = index;
+    }
+    frames
+}
+
+/// The most telling views are nearly as good as all, better than as many taken evenly, and their σ are honest.
+#[test]
+fn few_of_many_views() {
+    let truth = Scene::new(Distortion::None).camera.intrinsics.fx;
+    let method = Method::Robust(Model::FocalCentre);
+    let (mut squares, mut ratios, mut against_even) = (0.0, Vec::new(), Vec::new());
+    const N: u64 = 12;
+    for seed in 0..N {
+        let frames = long_recording(seed);
+        let of = |frames: &[FrameCorners], n: usize| {
+            let board = board();
+            let input = Input { board: &board, factory: &FACTORY, tables: None, frames };
+            calibrate_from(&input, method, n).unwrap()
+        };
+        let (all, few) = (of(&frames, 1000), of(&frames, 40));
+        assert!(all.chosen.is_none() && all.views.len() == 300);
+        let chosen = few.chosen.unwrap();
+        assert_eq!([few.views.len(), chosen.n_chosen, chosen.n_usable], [40, 40, 300]);
+        // One of five views of the same: without regard to pictures 40 of 300 views show some 30 of them.
+        assert!(few.n_pictures >= 30, "{} of {}", few.n_pictures, chosen.n_pictures);
+        let left_out = |r: &&RejectedFrame| r.reason == Rejection::NotChosen { n_chosen: 40 };
+        assert_eq!(few.rejected.iter().filter(left_out).count(), 260);
+        let even: Vec<FrameCorners> = frames[..60].iter().take(40).cloned().collect();
+        ratios.push(few.focal_px().sigma / all.focal_px().sigma);
+        against_even.push(few.focal_px().sigma / of(&even, 1000).focal_px().sigma);
+        squares += normalised(few.focal_px(), truth).powi(2) / N as f64;
+    }
+    // 40 of 60 pictures, one of five views each: the root of 7.5 is 2.7 where all views tell the same.
+    assert!(mean(&ratios) < 2.3, "{ratios:?}");
+    assert!(mean(&against_even) < 0.95, "{against_even:?}");
+    assert!(squares < 2.0, "{squares}");
+}
+
+/// The choice does not depend on the order in which frames are given.
+#[test]
+fn order_of_many_frames_does_not_matter() {
+    let mut frames = long_recording(3);
+    let board = board();
+    let run = |frames: &[FrameCorners]| {
+        let input = Input { board: &board, factory: &FACTORY, tables: None, frames };
+        format!("{:?}", calibrate_from(&input, Method::Auto, 30).unwrap())
+    };
+    let first = run(&frames);
+    frames.reverse();
+    frames.swap(5, 200);
+    assert_eq!(first, run(&frames));
+}
+
+/// One thread and three give the same bits.
+#[cfg(feature = "parallel")]
+#[test]
+fn threads_do_not_matter() {
+    let tables = tables();
+    let frames = Scene { wave_m: 3e-4, ..Scene::new(Distortion::None) }.frames(9);
+    let on = |n| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
+        format!("{:?}", pool.install(|| run(&frames, Some(&tables), Method::Auto).unwrap()))
+    };
+    assert_eq!(on(1), on(3));
 }

@@ -27,6 +27,21 @@ pub(super) struct Gathered {
     pub(super) rejected: Vec<RejectedFrame>,
 }
 
+impl Gathered {
+    /// Leaves the views out that are not among these (indices, ascending).
+    pub(super) fn keep_only(&mut self, indices: &[usize]) {
+        let n_chosen = indices.len();
+        for (index, view) in std::mem::take(&mut self.views).into_iter().enumerate() {
+            if indices.binary_search(&index).is_ok() {
+                self.views.push(view);
+            } else {
+                let reason = Rejection::NotChosen { n_chosen };
+                self.rejected.push(RejectedFrame { frame: view.frame, reason });
+            }
+        }
+    }
+}
+
 /// The factory's camera as an ideal pinhole, as the paper takes it.
 fn pinhole(input: &Input<'_>) -> Camera {
     Camera { intrinsics: *input.factory, distortion: Distortion::None }

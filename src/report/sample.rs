@@ -264,6 +264,7 @@ fn calibration(frames: &[FrameAudit]) -> Calibration {
         ],
         covariance: vec![0.124, 0.01, -0.02, 0.01, 0.0441, 0.0, -0.02, 0.0, 0.0676],
         views: frames.iter().filter_map(|f| f.own_view.clone()).collect(),
+        chosen: None,
         n_pictures: N_FRAMES,
         surface: None,
         surfaces: Vec::new(),

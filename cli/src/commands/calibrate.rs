@@ -6,7 +6,8 @@ use rayon::prelude::*;
 use truedepth::{
     board::CharucoBoard,
     calibrate::{
-        self, FrameCorners, Input as Views, Method, Model, calibrate, coverage, guess_intrinsics,
+        self, FrameCorners, Input as Views, Method, Model, calibrate_from, coverage,
+        guess_intrinsics,
     },
     detect::{Corner, Detector},
     export::{self, Format},
@@ -27,7 +28,7 @@ use crate::{
 pub(crate) fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome, Failure> {
     let format = args.export.as_deref().map(|file| format_of(file, args.format)).transpose()?;
     let seen = look(args, terminal)?;
-    let (name, calibration) = measure(&seen, method(args, &seen))?;
+    let (name, calibration) = measure(&seen, method(args, &seen), args.views)?;
     let named = if matches!(args.method, args::Method::Paper) { "paper" } else { "auto" };
     let document = wire::Calibration::new(&name, named, seen.factory.as_ref(), &calibration);
     if let (Some(file), Some(format)) = (&args.export, format) {
@@ -172,14 +173,18 @@ fn corners(
     Ok((seen, size_px))
 }
 
-fn measure(seen: &Seen, method: Method) -> Result<(String, calibrate::Calibration), Failure> {
+fn measure(
+    seen: &Seen,
+    method: Method,
+    max_views: usize,
+) -> Result<(String, calibrate::Calibration), Failure> {
     if seen.frames.is_empty() {
         return Err(Failure::new(format!("{}: the board was not seen in any image", seen.name))
             .hint("check --board with `truedepth detect`"));
     }
     let start = seen.start();
     let views = seen.views(&start);
-    let calibration = calibrate(&views, method).map_err(|error| {
+    let calibration = calibrate_from(&views, method, max_views).map_err(|error| {
         let failure = Failure::new(format!("{}: no intrinsics: cannot tell: {error}", seen.name));
         match coverage(&views).advice() {
             Some(advice) => failure.hint(advice),
@@ -262,6 +267,18 @@ fn table(calibration: &wire::Calibration) -> String {
             calibration.rejected.len(),
         ),
     ));
+    if let Some(chosen) = &calibration.chosen {
+        let cost = chosen.focal_sigma_ratio.map_or(String::new(), |ratio| {
+            format!("; with all of them, σ from corner noise would be {ratio:.2} times smaller")
+        });
+        rows.push((
+            "views chosen",
+            format!(
+                "the {} that tell most, of {} ({} different pictures){cost} (--views N)",
+                chosen.n_chosen, chosen.n_usable, chosen.n_pictures
+            ),
+        ));
+    }
     rows.extend(board_row(calibration));
     rows.extend(stability_rows(calibration));
     for (i, candidate) in calibration.candidates.iter().enumerate() {

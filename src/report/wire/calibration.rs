@@ -64,6 +64,9 @@ pub struct Calibration {
     /// Frames that were left out.
     #[serde(default)]
     pub rejected: Vec<Rejected>,
+    /// How the views were chosen; absent where all usable ones took part.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chosen: Option<Chosen>,
     /// The shapes of the board that were tried.
     #[serde(default)]
     pub surfaces: Vec<Surface>,
@@ -81,12 +84,25 @@ pub struct Calibration {
     pub projection_uncertainty: Option<ProjectionUncertainty>,
 }
 
+/// A choice of the most telling views.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Chosen {
+    /// Views that could have taken part.
+    pub n_usable: usize,
+    /// Views that did.
+    pub n_chosen: usize,
+    /// Different pictures among those that could have.
+    pub n_pictures: usize,
+    /// How many times the focal length's σ from corner noise is larger than with all of them.
+    pub focal_sigma_ratio: Option<f64>,
+}
+
 /// A frame that was left out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Rejected {
     /// Index of the frame in the recording.
     pub frame: usize,
-    /// `few_corners`, `narrow_corners`, `no_pose`, `near_accepted` or `disagrees`.
+    /// `few_corners`, `narrow_corners`, `no_pose`, `near_accepted`, `not_chosen` or `disagrees`.
     pub reason: String,
     /// The same in a sentence.
     pub why: String,
@@ -347,6 +363,12 @@ impl Calibration {
             views: calibration.views.iter().map(View::from).collect(),
             outliers: calibration.outliers.iter().map(Outlier::from).collect(),
             rejected: calibration.rejected.iter().map(Rejected::from).collect(),
+            chosen: calibration.chosen.map(|chosen| Chosen {
+                n_usable: chosen.n_usable,
+                n_chosen: chosen.n_chosen,
+                n_pictures: chosen.n_pictures,
+                focal_sigma_ratio: finite(chosen.focal_sigma_ratio),
+            }),
             surfaces: calibration.surfaces.iter().map(Surface::from).collect(),
             board_surface: calibration.surface.as_ref().map(BoardSurface::from),
             left_out: calibration
