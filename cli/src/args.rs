@@ -730,6 +730,14 @@ Examples:
   truedepth man | man -l -
   truedepth man audit > truedepth-audit.1";
 
+/// A number of views that can disagree.
+fn at_least_three(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(n) if n >= 3 => Ok(n),
+        _ => Err("a calibration takes at least 3 views: give a whole number from 3 on".to_owned()),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use clap::CommandFactory;
@@ -772,13 +780,5 @@ mod tests {
                 assert!(arg.get_help().is_some(), "{} {}", verb.get_name(), arg.get_id());
             }
         }
-    }
-}
-
-/// A number of views that can disagree.
-fn at_least_three(text: &str) -> Result<usize, String> {
-    match text.parse() {
-        Ok(n) if n >= 3 => Ok(n),
-        _ => Err("a calibration takes at least 3 views: give a whole number from 3 on".to_owned()),
     }
 }

@@ -5,7 +5,7 @@
 pub(super) fn abreast<T: Sync, R: Send>(items: &[T], one: impl Fn(&T) -> R + Sync) -> Vec<R> {
     use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
     // Items are few and long: each is a task of its own.
-    items.par_iter().map(|item| one(item)).collect()
+    items.par_iter().map(&one).collect()
 }
 
 /// The results of `one` for all items, in their order; on all cores where the feature `parallel` is on.

@@ -412,31 +412,24 @@ fn projection_is_least_known_where_nothing_was_seen() {
     assert!(whole.left_out.iter().all(|l| (l.focal_px - focal.value).abs() < 3.0 * focal.sigma));
 }
 
-/// A recording of minutes: 300 views of which many are alike.
+/// A recording of minutes: the hand rests at 60 places, five frames at each, all with the same noise.
 fn long_recording(seed: u64) -> Vec<FrameCorners> {
-    let scene = Scene { n_views: 60, ..Scene::new(Distortion::None) };
-    let mut frames = scene.frames(seed);
-    // The hand rests: each view is seen five times, with noise of its own.
+    let scene = Scene { n_views: 60, noise_px: 0.0, ..Scene::new(Distortion::None) };
     let mut random = Random(seed + 77);
-    let rests: Vec<FrameCorners> = frames
-        .iter()
-        .flat_map(|frame| std::iter::repeat_n(frame.clone(), 4))
-        .map(|mut frame| {
-            for corner in &mut frame.corners {
-                corner.pixel.x += 0.1 * random.normal();
-                corner.pixel.y += 0.1 * random.normal();
-            }
-            frame
-        })
-        .collect();
-    frames.extend(rests);
+    let mut frames: Vec<FrameCorners> =
+        scene.frames(seed).iter().flat_map(|frame| std::iter::repeat_n(frame.clone(), 5)).collect();
     for (index, frame) in frames.iter_mut().enumerate() {
         frame.frame = index;
+        for corner in &mut frame.corners {
+            corner.pixel.x += 0.1 * random.normal();
+            corner.pixel.y += 0.1 * random.normal();
+            corner.sigma_px = 0.1;
+        }
     }
     frames
 }
 
-/// The most telling views are nearly as good as all, better than as many taken evenly, and their σ are honest.
+/// The most telling views are nearly as good as all, better than as many spread evenly, and their σ are honest.
 #[test]
 fn few_of_many_views() {
     let truth = Scene::new(Distortion::None).camera.intrinsics.fx;
@@ -454,18 +447,20 @@ fn few_of_many_views() {
         assert!(all.chosen.is_none() && all.views.len() == 300);
         let chosen = few.chosen.unwrap();
         assert_eq!([few.views.len(), chosen.n_chosen, chosen.n_usable], [40, 40, 300]);
-        // One of five views of the same: without regard to pictures 40 of 300 views show some 30 of them.
-        assert!(few.n_pictures >= 30, "{} of {}", few.n_pictures, chosen.n_pictures);
+        // Nearly every picture is among them: 40 of 300 views at random would show two thirds of some thirty.
+        let (shown, all_pictures) = (few.n_pictures as f64, chosen.n_pictures as f64);
+        assert!(shown > 0.8 * all_pictures, "{shown} of {all_pictures}");
         let left_out = |r: &&RejectedFrame| r.reason == Rejection::NotChosen { n_chosen: 40 };
         assert_eq!(few.rejected.iter().filter(left_out).count(), 260);
-        let even: Vec<FrameCorners> = frames[..60].iter().take(40).cloned().collect();
+        let even: Vec<FrameCorners> = (0..40).map(|i| frames[i * 300 / 40].clone()).collect();
         ratios.push(few.focal_px().sigma / all.focal_px().sigma);
         against_even.push(few.focal_px().sigma / of(&even, 1000).focal_px().sigma);
         squares += normalised(few.focal_px(), truth).powi(2) / N as f64;
     }
     // 40 of 60 pictures, one of five views each: the root of 7.5 is 2.7 where all views tell the same.
     assert!(mean(&ratios) < 2.3, "{ratios:?}");
-    assert!(mean(&against_even) < 0.95, "{against_even:?}");
+    println!("σ as a share of all views': {ratios:?}, of an even spread's: {against_even:?}");
+    assert!(mean(&against_even) < 1.0, "{against_even:?}");
     assert!(squares < 2.0, "{squares}");
 }
 

@@ -89,7 +89,8 @@ pub fn advance(pose: &Pose<Color, Board>, step: &[f64; 6]) -> Pose<Color, Board>
     )
 }
 
-/// The nearest minimum from `start`, to this share of the sum of squares, and its weighted sum of squares; `None` where `start` does not project.
+/// The nearest minimum from `start`, to this share of the sum of squares, and its weighted sum of squares; `None` where
+/// `start` does not project.
 pub(super) fn refine(
     camera: &Camera,
     sightings: &[Sighting],
