@@ -294,12 +294,15 @@ fn padded(taps: &[f32; TAPS]) -> [f32; PADDED] {
 }
 
 /// Adds the outer product of the taps with themselves.
+#[inline(always)]
 fn add_products(normal: &mut Normal, taps: &[f32; TAPS]) {
-    let mut entries = normal.iter_mut();
+    let mut rest = &mut normal[..];
     for i in 0..TAPS {
-        for (tap, entry) in taps[..=i].iter().zip(&mut entries) {
+        let (row, after) = rest.split_at_mut(i + 1);
+        for (entry, tap) in row.iter_mut().zip(&taps[..=i]) {
             *entry += taps[i] * tap;
         }
+        rest = after;
     }
 }
 
@@ -318,6 +321,14 @@ pub(super) struct BlurModel {
 impl BlurModel {
     /// From ±1 for every sample of every marker, row by row, `size` along one side.
     pub(super) fn new(size: usize, codes: &[f32]) -> Self {
+        vectorized(
+            #[inline(always)]
+            || Self::build(size, codes),
+        )
+    }
+
+    #[inline(always)]
+    fn build(size: usize, codes: &[f32]) -> Self {
         let n2 = size * size;
         let (size, n_used) = (size as i32, codes.len() / n2);
         let mut shifted = Vec::with_capacity((n_used + 1) * n2);

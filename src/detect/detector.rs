@@ -6,8 +6,8 @@ use crate::{board::CharucoBoard, geom::Pixel, image::Gray};
 
 use super::{
     Corner, Identity, Observation, Reason, Reject,
-    identify::{Expected, NotIdentified, Placement},
-    lattice::{Lattice, lattices},
+    identify::{Expected, Identified, NotIdentified},
+    lattice::{Lattice, Node, lattices},
     map::{SmoothMap, length},
     pyramid::Level,
     refine::{Guess, Scales, Window, refine},
@@ -46,7 +46,7 @@ struct Memory {
 const MOST_SADDLES_PER_MPX: f64 = 12_000.0;
 const LEAST_MOST_SADDLES: usize = 600;
 /// Nodes that make a lattice worth reading: two cells.
-pub(super) const MIN_NODES: usize = 6;
+const MIN_NODES: usize = 6;
 /// Lattices tried on one level, largest first.
 const MOST_LATTICES: usize = 4;
 /// The shorter side of the coarsest level tried, pixels.
@@ -80,6 +80,11 @@ impl Detector {
         observation
     }
 
+    /// Nodes that make a lattice worth reading: boards of 3 × 3 squares have four.
+    pub(super) fn min_nodes(&self) -> usize {
+        MIN_NODES.min(self.board.n_corners()).max(4)
+    }
+
     fn detect_in(&self, image: &Gray, memory: &mut Memory) -> Observation {
         let mut rejects = Vec::new();
         let Memory { level, search, window } = memory;
@@ -104,7 +109,7 @@ impl Detector {
     ) -> Option<Found> {
         let saddles = saddles(level, most_saddles(level), memory);
         let mut identified: Option<Found> = None;
-        for mut lattice in lattices(level, &saddles, MIN_NODES).into_iter().take(MOST_LATTICES) {
+        for mut lattice in lattices(level, &saddles, self.min_nodes()).into_iter().take(MOST_LATTICES) {
             if identified.is_some() {
                 rejects.push(Reject { pixel: lattice.middle(), reason: Reason::SecondLattice });
                 continue;
@@ -121,7 +126,7 @@ impl Detector {
                 self.expected.by_effort(scales.image(), &lattice, &map)
             });
             match placement {
-                Ok(placement) => identified = Some(Found { lattice, placement }),
+                Ok(identity) => identified = Some(Found { lattice, identity }),
                 Err(why) => {
                     let reason = match why {
                         NotIdentified::NoMarkers => Reason::NoMarkers,
@@ -142,13 +147,13 @@ impl Detector {
         i: i32,
         j: i32,
         contrast: f64,
-    ) -> Option<Pixel> {
+    ) -> Option<(Pixel, f64)> {
         let (x, y) = (f64::from(i), f64::from(j));
         let (predicted, axes) = (map.at(x, y)?, map.axes(x, y)?);
         if !inside(scales.image(), predicted) {
             return None;
         }
-        self.corner(scales, predicted, axes, contrast).ok().map(|(pixel, _)| pixel)
+        self.corner(scales, predicted, axes, contrast).ok()
     }
 
     /// Refines every corner that the identified board shows.
@@ -160,20 +165,18 @@ impl Detector {
     ) -> Observation {
         let board = &self.board;
         let (columns, rows) = (board.squares_x as i32 - 1, board.squares_y as i32 - 1);
-        let placement = &found.placement;
+        let Identified { placement, markers } = &found.identity;
         let mut known: Vec<([f64; 2], Pixel)> = Vec::new();
+        // A node of the lattice is where its corner is, to a fraction of a pixel: a better start than the map.
+        let mut starts: Vec<Option<Node>> = vec![None; board.n_corners()];
         for node in &found.lattice.nodes {
             let [x, y] = placement.corner(node.i, node.j);
             if (0..columns).contains(&x) && (0..rows).contains(&y) {
                 known.push(([f64::from(x), f64::from(y)], node.pixel));
+                starts[(y * columns + x) as usize] = Some(*node);
             } else {
                 rejects.push(Reject { pixel: node.pixel, reason: Reason::OffBoard });
             }
-        }
-        // A node of the lattice is where its corner is, to a fraction of a pixel: a better start than the map.
-        let mut starts: Vec<Option<Pixel>> = vec![None; board.n_corners()];
-        for &([x, y], pixel) in &known {
-            starts[y as usize * columns as usize + x as usize] = Some(pixel);
         }
         let contrast = found.lattice.contrast;
         // First what the lattice foretells; what that finds brings corners into reach that were too far from it.
@@ -195,9 +198,13 @@ impl Detector {
                 if !inside(scales.image(), predicted) {
                     continue;
                 }
-                let near = |start: &Pixel| start.distance(predicted) < MAX_START_PX;
-                let start = starts[id].take().filter(near).unwrap_or(predicted);
-                match self.corner(scales, start, axes, contrast) {
+                let near = |node: &Node| node.pixel.distance(predicted) < MAX_START_PX;
+                let measured = match starts[id].take().filter(near) {
+                    Some(Node { pixel, sigma_px: Some(sigma_px), .. }) => Ok((pixel, sigma_px)),
+                    Some(node) => self.corner(scales, node.pixel, axes, contrast),
+                    None => self.corner(scales, predicted, axes, contrast),
+                };
+                match measured {
                     Ok((pixel, sigma_px)) => corners.push(Corner { id, pixel, sigma_px }),
                     Err(reason) => failed.push(Reject { pixel: predicted, reason }),
                 }
@@ -215,7 +222,7 @@ impl Detector {
             layout: placement.layout,
             mirrored: placement.mirrored,
             inverted: placement.inverted,
-            n_markers: placement.n_markers,
+            markers: markers.clone(),
             margin: placement.margin,
         };
         if corners.len() < 4 {
@@ -286,7 +293,7 @@ impl Detector {
 /// An identified lattice.
 struct Found {
     lattice: Lattice,
-    placement: Placement,
+    identity: Identified,
 }
 
 /// How many saddles of a level are kept.

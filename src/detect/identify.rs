@@ -65,6 +65,14 @@ const TURNS: [[[i32; 2]; 2]; 8] = [
     [[0, -1], [-1, 0]],
 ];
 
+/// A placement that was accepted.
+#[derive(Clone, Debug)]
+pub(super) struct Identified {
+    pub(super) placement: Placement,
+    /// The markers whose bits voted, by ascending id.
+    pub(super) markers: Vec<usize>,
+}
+
 /// Neighbouring bits are not independent under blur: this many count as one.
 const BITS_PER_VOTE: f64 = 2.0;
 /// Least lead over the runner-up, nats: one wrong placement in e¹² ≈ 160 000 were the model exact.
@@ -78,6 +86,8 @@ const CLEAR_INSIDE: f64 = 0.9;
 const BLURRED_INSIDE: f64 = 0.65;
 /// Correlation of the bits with the expectation that only a clear picture has.
 const CLEAR_CORRELATION: f64 = 0.7;
+/// Scores are the same in both layouts where they differ by less than this.
+const SAME_SCORE: f64 = 0.999;
 /// A cell votes when its rim is brighter than the border of its marker by this fraction of the board's contrast.
 const MIN_CELL_CONTRAST: f64 = 0.2;
 
@@ -131,15 +141,19 @@ fn cells(
         else {
             continue;
         };
-        let at = |u: f64, v: f64| {
-            let top = [p00.x + (p10.x - p00.x) * u, p00.y + (p10.y - p00.y) * u];
-            let bottom = [p01.x + (p11.x - p01.x) * u, p01.y + (p11.y - p01.y) * u];
-            image.bilinear(Pixel::new(
-                top[0] + (bottom[0] - top[0]) * v,
-                top[1] + (bottom[1] - top[1]) * v,
-            ))
+        // p00 + u·(p10 − p00) + v·(p01 − p00) + uv·(the rest)
+        let (x1, x2, x3) = (p10.x - p00.x, p01.x - p00.x, p11.x - p10.x - p01.x + p00.x);
+        let (y1, y2, y3) = (p10.y - p00.y, p01.y - p00.y, p11.y - p10.y - p01.y + p00.y);
+        let place = |u: f64, v: f64| {
+            Pixel::new(p00.x + u * (x1 + v * x3) + v * x2, p00.y + u * (y1 + v * y3) + v * y2)
         };
-        if let Some((samples, rim, border)) = sample_cell(board, at) {
+        // Between four places inside, all are: no need to look at each.
+        let sampled = if [p00, p10, p01, p11].iter().all(|p| image.contains(*p)) {
+            sample_cell(board, |u, v| Some(f64::from(image.between(place(u, v)))))
+        } else {
+            sample_cell(board, |u, v| image.bilinear(place(u, v)))
+        };
+        if let Some((samples, rim, border)) = sampled {
             let step = if bright { rim - border } else { border - rim };
             if step > MIN_CELL_CONTRAST * lattice.contrast {
                 cells.push(Cell { i, j, bright, samples, rim: rim as f32, border: border as f32 });
@@ -292,13 +306,13 @@ impl Expected {
         image: &Gray,
         lattice: &Lattice,
         map: &SmoothMap,
-    ) -> Result<Placement, NotIdentified> {
+    ) -> Result<Identified, NotIdentified> {
         let cells = cells(&self.board, image, lattice, map, true);
         // A mirrored placement is far from every other: it is tried only where no straight one convinces.
         self.best_by_bits(lattice, &cells, 0..4, CLEAR_INSIDE)
-            .and_then(|(placement, correlation)| {
+            .and_then(|(identified, correlation)| {
                 (correlation > CLEAR_CORRELATION)
-                    .then_some(placement)
+                    .then_some(identified)
                     .ok_or(NotIdentified::Ambiguous)
             })
             .or_else(|_| self.by_blurred_bits(lattice, &cells))
@@ -309,10 +323,10 @@ impl Expected {
         &self,
         lattice: &Lattice,
         cells: &[Cell],
-    ) -> Result<Placement, NotIdentified> {
+    ) -> Result<Identified, NotIdentified> {
         self.best_by_bits(lattice, cells, 0..4, BLURRED_INSIDE)
             .or_else(|_| self.best_by_bits(lattice, cells, 0..8, BLURRED_INSIDE))
-            .map(|(placement, _)| placement)
+            .map(|(identified, _)| identified)
     }
 
     /// Lays the lattice onto the board where [`by_bits`](Self::by_bits) failed: under an unknown blur, then as a
@@ -322,7 +336,7 @@ impl Expected {
         image: &Gray,
         lattice: &Lattice,
         map: &SmoothMap,
-    ) -> Result<Placement, NotIdentified> {
+    ) -> Result<Identified, NotIdentified> {
         let bright = cells(&self.board, image, lattice, map, true);
         let dark = || cells(&self.board, image, lattice, map, false);
         self.by_blurred_bits(lattice, &bright).or_else(|why| {
@@ -332,18 +346,17 @@ impl Expected {
         })
     }
 
-    /// The marker that a placement expects in a cell: `Some(None)` beyond the board, `None` where the square there
-    /// has the other colour.
-    fn marker(&self, place: &Placement, cell: &Cell) -> Option<Option<usize>> {
+    /// The board's squares as a placement lays cells on them.
+    fn squares(&self, place: &Placement) -> Squares<'_> {
+        let layout = self.layouts.iter().position(|l| *l == place.layout);
         // The square between the corners (i, j) and (i + 1, j + 1): its column is the larger of its corners'.
-        let [a, b] = [place.corner(cell.i, cell.j), place.corner(cell.i + 1, cell.j + 1)];
-        let (column, row) = (a[0].max(b[0]), a[1].max(b[1]));
-        let (columns, rows) = (self.board.squares_x as i32, self.board.squares_y as i32);
-        if !((0..columns).contains(&column) && (0..rows).contains(&row)) {
-            return Some(None);
+        let [a, b] = place.turn.map(|[i, j]| (i + j).max(0));
+        Squares {
+            markers: &self.markers[layout.expect("a placement has one of the layouts")],
+            turn: place.turn,
+            shift: [place.shift[0] + a, place.shift[1] + b],
+            size: [self.board.squares_x, self.board.squares_y],
         }
-        let squares = &self.markers[self.layouts.iter().position(|l| *l == place.layout)?];
-        squares[(row * columns + column) as usize].map(Some)
     }
 
     /// Every placement that the colours of the squares allow, with the number of its markers.
@@ -370,16 +383,11 @@ impl Expected {
                         significance: 0.0,
                     };
                     // All cells have one colour and the board alternates: the first that lies on it decides.
-                    let fits = cells.iter().find_map(|cell| match self.marker(&place, cell) {
-                        Some(None) => None,
-                        Some(Some(_)) => Some(true),
-                        None => Some(false),
-                    });
-                    if fits == Some(true) {
-                        place.n_markers = cells
-                            .iter()
-                            .filter(|c| matches!(self.marker(&place, c), Some(Some(_))))
-                            .count();
+                    let squares = self.squares(&place);
+                    let first = cells.iter().find_map(|cell| squares.at(cell));
+                    if let Some(Some(_)) = first {
+                        place.n_markers =
+                            cells.iter().filter(|cell| squares.marker(cell).is_some()).count();
                         all.push(Candidate { score: 0.0, turn, place });
                     }
                 }
@@ -422,7 +430,7 @@ impl Expected {
         cells: &[Cell],
         turns: Range<usize>,
         least_inside: f64,
-    ) -> Result<(Placement, f64), NotIdentified> {
+    ) -> Result<(Identified, f64), NotIdentified> {
         if cells.is_empty() {
             return Err(NotIdentified::NoMarkers);
         }
@@ -441,12 +449,24 @@ impl Expected {
         let mut candidates = self.placements(lattice, cells, turns, least_inside);
         for candidate in &mut candidates {
             let mut score = 0.0_f32;
+            let squares = self.squares(&candidate.place);
             for (cell, bits) in cells.iter().zip(values[candidate.turn].chunks_exact(n2)) {
-                if let Some(Some(id)) = self.marker(&candidate.place, cell) {
+                if let Some(id) = squares.marker(cell) {
                     score += dot(bits, &self.codes[id * n2..][..n2]);
                 }
             }
             candidate.score = f64::from(score);
+        }
+        // A view of the board's inside can be the same in both layouts, one column apart: then the word of whoever
+        // printed the board decides, and without it nobody can.
+        if let Some(stated) = self.board.layout {
+            let top = |of_stated: bool| {
+                let scores = candidates.iter().filter(|c| (c.place.layout == stated) == of_stated);
+                scores.map(|c| c.score).fold(f64::NEG_INFINITY, f64::max)
+            };
+            if top(true) >= SAME_SCORE * top(false) {
+                candidates.retain(|c| c.place.layout == stated);
+            }
         }
         let (best, second) = best_two(&candidates).ok_or(NotIdentified::Ambiguous)?;
         let n_bits = (best.place.n_markers * (size - 2) * (size - 2)) as f64;
@@ -458,11 +478,12 @@ impl Expected {
         let correlation = gain / energy.sqrt().max(1e-6);
         let significance = correlation * (n_bits / BITS_PER_VOTE).sqrt();
         let margin = gain / variance * (best.score - second.max(0.0)) / BITS_PER_VOTE;
-        Ok((accept(Placement { margin, significance, ..best.place })?, correlation))
+        let placement = Placement { margin, significance, ..best.place };
+        Ok((self.accept(placement, cells)?, correlation))
     }
 
     /// The placement that, under a blur of its own, leaves the least of the picture unexplained.
-    fn best_by_blur(&self, lattice: &Lattice, cells: &[Cell]) -> Result<Placement, NotIdentified> {
+    fn best_by_blur(&self, lattice: &Lattice, cells: &[Cell]) -> Result<Identified, NotIdentified> {
         if cells.len() < 4 {
             return Err(NotIdentified::Ambiguous); // Too few samples for a kernel.
         }
@@ -479,8 +500,9 @@ impl Expected {
         let entrants: Vec<Entrant> = candidates
             .iter()
             .map(|candidate| {
-                let marker = |cell| self.marker(&candidate.place, cell).flatten();
-                Entrant::new(candidate.turn, cells.iter().map(marker).collect())
+                let squares = self.squares(&candidate.place);
+                let markers = cells.iter().map(|cell| squares.marker(cell)).collect();
+                Entrant::new(candidate.turn, markers)
             })
             .collect();
         let model = self.blur.get_or_init(|| BlurModel::new(self.size, &self.codes));
@@ -488,7 +510,53 @@ impl Expected {
             .winner()
             .ok_or(NotIdentified::Ambiguous)?;
         let Won { index, margin, significance } = won;
-        accept(Placement { margin, significance, ..candidates[index].place })
+        self.accept(Placement { margin, significance, ..candidates[index].place }, &cells)
+    }
+
+    /// The placement with its markers, if its lead is clear.
+    fn accept(&self, placement: Placement, cells: &[Cell]) -> Result<Identified, NotIdentified> {
+        if placement.n_markers >= 2
+            && placement.margin > MIN_MARGIN
+            && placement.significance > MIN_SIGNIFICANCE
+        {
+            let squares = self.squares(&placement);
+            let mut markers: Vec<usize> =
+                cells.iter().filter_map(|cell| squares.marker(cell)).collect();
+            markers.sort_unstable();
+            Ok(Identified { placement, markers })
+        } else {
+            Err(NotIdentified::Ambiguous)
+        }
+    }
+}
+
+/// What a placement expects where.
+struct Squares<'a> {
+    /// Row by row.
+    markers: &'a [Option<usize>],
+    turn: [[i32; 2]; 2],
+    shift: [i32; 2],
+    size: [usize; 2],
+}
+
+impl Squares<'_> {
+    /// The square under a cell: `None` beyond the board, `Some(None)` where it shows no marker.
+    #[inline]
+    fn at(&self, cell: &Cell) -> Option<Option<usize>> {
+        let place = |a: usize| {
+            let [i, j] = self.turn[a];
+            // What is negative becomes larger than any board.
+            (i * cell.i + j * cell.j + self.shift[a]) as u32 as usize
+        };
+        let (column, row) = (place(0), place(1));
+        (column < self.size[0] && row < self.size[1])
+            .then(|| self.markers[row * self.size[0] + column])
+    }
+
+    /// The marker expected in a cell, if any.
+    #[inline]
+    fn marker(&self, cell: &Cell) -> Option<usize> {
+        self.at(cell).flatten()
     }
 }
 
@@ -506,15 +574,4 @@ fn best_two(candidates: &[Candidate]) -> Option<(Candidate, f64)> {
         }
     }
     best.map(|b| (*b, second))
-}
-
-fn accept(placement: Placement) -> Result<Placement, NotIdentified> {
-    if placement.n_markers >= 2
-        && placement.margin > MIN_MARGIN
-        && placement.significance > MIN_SIGNIFICANCE
-    {
-        Ok(placement)
-    } else {
-        Err(NotIdentified::Ambiguous)
-    }
 }

@@ -34,6 +34,8 @@ pub(super) struct Node {
     pub(super) j: i32,
     /// Where it lies in the image.
     pub(super) pixel: Pixel,
+    /// The standard deviation of that, pixels, where it has been measured as a corner.
+    pub(super) sigma_px: Option<f64>,
 }
 
 impl Lattice {
@@ -86,7 +88,7 @@ impl Lattice {
     pub(super) fn extend(
         &mut self,
         most: usize,
-        mut find: impl FnMut(&SmoothMap, i32, i32) -> Option<Pixel>,
+        mut find: impl FnMut(&SmoothMap, i32, i32) -> Option<(Pixel, f64)>,
     ) {
         let mut known: BTreeSet<(i32, i32)> = self.nodes.iter().map(|n| (n.j, n.i)).collect();
         let mut tried = known.clone();
@@ -99,9 +101,9 @@ impl Lattice {
             let n_before = self.nodes.len();
             for &(j, i) in &around {
                 if self.nodes.len() < most
-                    && let Some(pixel) = find(&map, i, j)
+                    && let Some((pixel, sigma_px)) = find(&map, i, j)
                 {
-                    self.nodes.push(Node { i, j, pixel });
+                    self.nodes.push(Node { i, j, pixel, sigma_px: Some(sigma_px) });
                     known.insert((j, i));
                 }
             }
@@ -239,7 +241,8 @@ fn grow(
     let step = |axis: usize| [(1, 0), (0, 1), (-1, 0), (0, -1)][axis];
     let mut bright_votes = 0_i32;
     while let Some((p, i, j, first)) = queue.pop_front() {
-        nodes.push(Node { i, j, pixel: level.to_image(saddles[p].x, saddles[p].y) });
+        let pixel = level.to_image(saddles[p].x, saddles[p].y);
+        nodes.push(Node { i, j, pixel, sigma_px: None });
         contrasts.push(saddles[p].contrast);
         // The sector from +i to +j is the cell (i, j).
         let bright = saddles[p].is_bright_after(first) == ((i + j) % 2 == 0);

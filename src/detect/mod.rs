@@ -74,8 +74,9 @@ pub struct Identity {
     pub mirrored: bool,
     /// Black and white are exchanged on the print.
     pub inverted: bool,
-    /// Markers whose bits voted.
-    pub n_markers: usize,
+    /// Ids of the markers whose bits voted, ascending. Markers of the board that are hidden, out of sight or too faint
+    /// are not among them.
+    pub markers: Vec<usize>,
     /// Lead over the runner-up placement, as a log-likelihood ratio in nats.
     pub margin: f64,
 }

@@ -14,14 +14,18 @@ pub(super) struct Level {
     pub(super) height: usize,
     /// Image pixels per pixel of this level, along one axis.
     pub(super) factor: usize,
-    /// Grey values 0..=255, smoothed.
-    pub(super) gray: Vec<f32>,
+    /// Smoothed grey values in units of 1/[`UNITS`] grey level: 16 bits move half the memory of floats, and second
+    /// differences of them still fit.
+    pub(super) values: Vec<i16>,
     /// Memory of the latest rows of block sums: row y lies at y modulo [`KEPT_ROWS`].
     blocks: Vec<u16>,
     /// Memory of one row, filtered along y, and of sums along y.
-    column: Vec<f32>,
+    column: Vec<u16>,
     sums: Vec<u32>,
 }
+
+/// Units of a grey level in [`Level::values`].
+pub(super) const UNITS: i16 = 32;
 
 /// Rows of block sums kept: the filter takes five.
 const KEPT_ROWS: usize = 8;
@@ -35,9 +39,9 @@ impl Level {
             return None;
         }
         (self.width, self.height, self.factor) = (width, height, factor);
-        self.gray.resize(width * height, 0.0);
+        self.values.resize(width * height, 0);
         self.blocks.resize(KEPT_ROWS * width, 0);
-        self.column.resize(width + 4, 0.0);
+        self.column.resize(width + 4, 0);
         self.sums.resize(width * factor, 0);
         vectorized(
             #[inline(always)]
@@ -50,7 +54,8 @@ impl Level {
     #[inline(always)]
     fn smooth(&mut self, image: &Gray) {
         let (width, height, factor) = (self.width, self.height, self.factor);
-        let scale = 1.0 / (256.0 * unit(factor) as f32);
+        let shift = unit(factor).ilog2();
+        let half = (1_u16 << shift) >> 1;
         let column = &mut self.column[..width + 4];
         let mut n_blocks = 0;
         for y in 0..height {
@@ -67,19 +72,20 @@ impl Level {
             let [a, b, c, d, e] = [row(-2), row(-1), row(0), row(1), row(2)];
             let out = &mut column[2..2 + width];
             for i in 0..width {
-                // At most 4080 · 16: it fits.
+                // At most 4080 · 16, plus 8: it fits. Sixteenths of a grey level are kept.
                 let sum = (a[i] + e[i]) + 4 * (b[i] + d[i]) + 6 * c[i];
-                out[i] = f32::from(sum);
+                out[i] = (sum + half) >> shift;
             }
             column[0] = column[2];
             column[1] = column[2];
             column[width + 2] = column[width + 1];
             column[width + 3] = column[width + 1];
             let [a, b, c, d, e] = [0, 1, 2, 3, 4].map(|dx| &column[dx..dx + width]);
-            let out = &mut self.gray[y * width..][..width];
+            let out = &mut self.values[y * width..][..width];
             for i in 0..width {
-                // Whole numbers below 2²⁴: exact.
-                out[i] = ((a[i] + e[i]) + 4.0 * (b[i] + d[i]) + 6.0 * c[i]) * scale;
+                // At most 4080 · 16, plus 4: it fits. From 1/256 of a grey level to 1/32.
+                let sum = (a[i] + e[i]) + 4 * (b[i] + d[i]) + 6 * c[i];
+                out[i] = ((sum + 4) >> 3) as i16;
             }
         }
     }
@@ -90,19 +96,29 @@ impl Level {
         Pixel::new(f64::from(x) * factor + offset, f64::from(y) * factor + offset)
     }
 
-    /// The nearest pixel's value; the border repeats outside.
+    /// Its pixels, rounded to whole grey levels.
+    pub(super) fn to_gray(&self) -> Gray {
+        let round = |v: &i16| ((v + UNITS / 2) / UNITS) as u8;
+        Gray::new(self.width, self.height, self.values.iter().map(round).collect())
+    }
+
+    /// The nearest pixel's grey value; the border repeats outside.
     pub(super) fn nearest(&self, x: f32, y: f32) -> f32 {
         // A cast from float saturates, so that no position can leave the image.
         let x = ((x + 0.5) as usize).min(self.width - 1);
         let y = ((y + 0.5) as usize).min(self.height - 1);
-        self.gray[y * self.width + x]
+        f32::from(self.values[y * self.width + x]) * (1.0 / f32::from(UNITS))
     }
 }
 
-/// What one grey level is in the block sums: the number of pixels, up to 16, so that sums fit into 16 bits even after
-/// the binomial filter.
+/// What one grey level is in the block sums: a power of two, at most 16, so that sums fit into 16 bits even after the
+/// binomial filter.
 fn unit(factor: usize) -> usize {
-    (factor * factor).min(16)
+    match factor {
+        1 => 1,
+        2 => 4,
+        _ => 16,
+    }
 }
 
 /// The sums over one row of blocks, in units of 1/[`unit`] grey level. `sums` is memory for a row of the image.
@@ -153,7 +169,7 @@ mod tests {
                     let p = level.to_image(x as f32, y as f32);
                     let expected = 2.0 * p.x + p.y;
                     assert!(
-                        (f64::from(level.gray[y * level.width + x]) - expected).abs() < 1e-3,
+                        (f64::from(level.nearest(x as f32, y as f32)) - expected).abs() < 1e-3,
                         "{factor} {x} {y}"
                     );
                 }

@@ -11,12 +11,15 @@
 //! board, narrow enough to stay off the markers. Blur that is symmetric, motion included, leaves the image symmetric
 //! about the crossing, so the fixed point of the iteration is unbiased.
 //!
+//! Newton's method finds it: as q moves the sum falls by K = M + Σ g (gᵀ(p − q))·(∇w)ᵀ, for the weights move with q.
 //! The estimate is linear in the noise of the pixels, so its covariance follows from that of the pixels without any
-//! model of the edge: δq = M⁻¹ Σ w g (p − q)ᵀ δg, with δg summed up pixel by pixel.
+//! model of the edge: δq = K⁻¹ Σ w·((gᵀr)·1 + g·rᵀ) δg, r = p − q, with δg summed up pixel by pixel.
+
+use std::array;
 
 use crate::{geom::Pixel, image::Gray};
 
-use super::{map::length, pyramid::Level, simd::vectorized};
+use super::{map::length, pyramid::Level, simd::{dot, vectorized}};
 
 /// A corner to refine.
 #[derive(Clone, Copy, Debug)]
@@ -60,8 +63,7 @@ impl<'a> Scales<'a> {
         if slot.is_none() {
             let mut level = Level::default();
             level.fill(self.image, factor)?;
-            let pixels = level.gray.iter().map(|v| (v + 0.5) as u8).collect();
-            *slot = Some(Gray::new(level.width, level.height, pixels));
+            *slot = Some(level.to_gray());
         }
         // Averaging divides white noise; what smoothing leaves of it is 0.27 of a pixel's (Σw² = 70/256 per axis).
         Some((slot.as_ref()?, (0.27 * self.noise / factor as f64).max(ROUNDING), self.window))
@@ -92,10 +94,14 @@ const REACH: f64 = 0.42;
 const MARKER_BLUR: f64 = 1.2;
 /// The cross is never narrower than this, pixels: blurred edges are wider.
 const MIN_WIDTH: f64 = 2.0;
-/// Converged when a step is shorter than this, pixels: steps shrink about fivefold, so what is left is a fifth of it.
-const CONVERGED: f64 = 1e-2;
-/// Steps at most. Good corners take two or three.
+/// Converged when a step is shorter than this, pixels: steps shrink at least tenfold.
+const CONVERGED: f64 = 2e-2;
+/// Steps at most. Good corners take one or two.
 const MOST_STEPS: usize = 8;
+/// The slope of the sums is taken anew where the corner has moved by more than this since, pixels.
+const SAME_SLOPE: f64 = 0.3;
+/// Least determinant of the slope, as a fraction of that without the motion of the weights: below, noise rules.
+const MIN_SLOPE: f64 = 0.1;
 /// What calibration targets, lenses and demosaicing leave even in a noiseless picture, pixels.
 const FLOOR_PX: f64 = 0.015;
 
@@ -195,26 +201,67 @@ fn iterate(
 ) -> Option<Refined> {
     let mut q = [from.x, from.y];
     let mut center: Option<(i64, i64)> = None;
+    let mut slope: Option<(Slope, [f64; 2])> = None;
     for step in 0..MOST_STEPS {
         let (cx, cy) = (q[0].round() as i64, q[1].round() as i64);
         if center.is_none_or(|(x, y)| (x - cx).abs() > 1 || (y - cy).abs() > 1) {
             window.fill(image, cx, cy, half)?;
             center = Some((cx, cy));
         }
-        let next = window.solve(cross, q)?;
-        let moved = length([next[0] - q[0], next[1] - q[1]]);
-        q = next;
+        // Newton's method; near the corner the slope hardly changes.
+        let near = |at: [f64; 2]| length([q[0] - at[0], q[1] - at[1]]) <= SAME_SLOPE;
+        let (slope, pull) = match slope {
+            Some((slope, at)) if near(at) => (slope, window.pull(cross, q)),
+            _ => {
+                let (new, pull) = window.slope(cross, q)?;
+                slope = Some((new, q));
+                (new, pull)
+            }
+        };
+        let [dx, dy] = slope.divide(pull);
+        q = [q[0] + dx, q[1] + dy];
         if !(length([q[0] - from.x, q[1] - from.y]) <= reach_px) {
             return None;
         }
+        let moved = length([dx, dy]);
         if moved < CONVERGED || (step + 1 == MOST_STEPS && moved < 0.05) {
             return Some(Refined {
                 pixel: Pixel::new(q[0], q[1]),
-                sigma_px: window.sigma(cross, q)?,
+                sigma_px: window.sigma(cross, &slope, q),
             });
         }
     }
     None
+}
+
+/// How fast the sums Σ w g gᵀ(p − q) fall as q moves: a matrix K, so that q + K⁻¹·sums is where they vanish.
+///
+/// K = M + N: M = Σ w g gᵀ would be all if the weights stood still. They move with q, and on a blurred edge what comes
+/// in on one side pulls, what goes out on the other pulls less: N = Σ g (gᵀr)·(∇w)ᵀ takes a tenth off M at a blur of
+/// σ = 2 px, and hence adds a tenth to σ.
+#[derive(Clone, Copy, Debug)]
+struct Slope([[f64; 2]; 2]);
+
+impl Slope {
+    fn det(&self) -> f64 {
+        let [[a, b], [c, d]] = self.0;
+        a * d - b * c
+    }
+
+    /// K⁻¹ v.
+    fn divide(&self, v: [f64; 2]) -> [f64; 2] {
+        let [[a, b], [c, d]] = self.0;
+        let det = self.det();
+        [(d * v[0] - b * v[1]) / det, (a * v[1] - c * v[0]) / det]
+    }
+
+    /// Trace of K⁻¹ V K⁻ᵀ for a symmetric V = [xx xy; xy yy].
+    fn covariance_trace(&self, [xx, xy, yy]: [f64; 3]) -> f64 {
+        let [[a, b], [c, d]] = self.0;
+        let (x, y) = (d * d + c * c, a * a + b * b);
+        let det = self.det();
+        (x * xx - 2.0 * (b * d + a * c) * xy + y * yy) / det / det
+    }
 }
 
 /// Below this width the blur asks for nothing, pixels: 1.25 times it still lies within [`SHARP_REACH`].
@@ -274,12 +321,37 @@ impl Cross {
         // The edge along the first axis lies where b is small, the other where a is.
         let first = bump(a * self.along[0]) * bump(b * self.width[1]);
         let second = bump(b * self.along[1]) * bump(a * self.width[0]);
-        first.max(second)
+        // Not `f32::max`, which must mind NaN.
+        if first > second { first } else { second }
+    }
+
+    /// The weight and its slope along both axes of the board, per square.
+    #[inline(always)]
+    fn weight_and_slope(&self, dx: f32, dy: f32) -> [f32; 3] {
+        let a = self.inverse[0][0] * dx + self.inverse[0][1] * dy;
+        let b = self.inverse[1][0] * dx + self.inverse[1][1] * dy;
+        let bump = |t: f32| (1.0 - t * t).max(0.0);
+        let (first_a, first_b) = (bump(a * self.along[0]), bump(b * self.width[1]));
+        let (second_a, second_b) = (bump(a * self.width[0]), bump(b * self.along[1]));
+        let (first, second) = (first_a * first_b, second_a * second_b);
+        let is_first = first > second;
+        let pick = |x: f32, y: f32| if is_first { x } else { y };
+        let weight = pick(first, second);
+        let minus_two = if weight > 0.0 { -2.0 } else { 0.0 };
+        let (scale_a, scale_b) =
+            (pick(self.along[0], self.width[0]), pick(self.width[1], self.along[1]));
+        [
+            weight,
+            minus_two * a * (scale_a * scale_a) * pick(first_b, second_b),
+            minus_two * b * (scale_b * scale_b) * pick(first_a, second_a),
+        ]
     }
 }
 
 /// Pixels handled at a time.
 const LANES: usize = 8;
+/// Gradients in a row of a sharp corner's window.
+const SHARP_COLUMNS: usize = 16;
 
 /// Gradients of a square part of the image, each at the centre of four pixels, after smoothing by (1 2 1)/4 along both
 /// axes: without it, sharp edges are undersampled and their squared gradients pull the corner towards pixel centres
@@ -299,8 +371,6 @@ pub(super) struct Window {
     /// Influences of smoothed pixels: memory only.
     smooth: Vec<f32>,
     column: Vec<u16>,
-    /// Σ w gx², Σ w gx gy, Σ w gy² of the last step.
-    moments: [f64; 3],
 }
 
 impl Window {
@@ -317,6 +387,14 @@ impl Window {
         let (columns, rows) = (x1 as usize - x0, y1 as usize - y0);
         // Smoothed pixels: one more than gradients along both axes. Beyond the image its border repeats.
         let n = columns + 1;
+        (self.x0, self.y0) = (x0 as f64 + 0.5, y0 as f64 + 0.5);
+        (self.rows, self.stride) = (rows, columns.next_multiple_of(LANES));
+        if self.stride == SHARP_COLUMNS
+            && (1..=image.width().saturating_sub(2 * SHARP_COLUMNS - 1)).contains(&x0)
+        {
+            self.fill_sharp(image, x0, y0);
+            return Some(());
+        }
         self.work.resize(n * (rows + 1), 0.0);
         self.column.resize(n + 2, 0);
         let (left, right) = (x0.saturating_sub(1), (x0 + n + 1).min(image.width()));
@@ -326,8 +404,8 @@ impl Window {
             let [a, b, c] = [y.saturating_sub(1), y, (y + 1).min(image.height() - 1)]
                 .map(|y| &image.row(y)[left..right]);
             let column = &mut self.column[first..][..right - left];
-            for i in 0..right - left {
-                column[i] = u16::from(a[i]) + 2 * u16::from(b[i]) + u16::from(c[i]);
+            for (((sum, &a), &b), &c) in column.iter_mut().zip(a).zip(b).zip(c) {
+                *sum = u16::from(a) + 2 * u16::from(b) + u16::from(c);
             }
             if first == 1 {
                 self.column[0] = self.column[1];
@@ -340,7 +418,7 @@ impl Window {
                 *out = f32::from(l + 2 * m + r) * (1.0 / 16.0);
             }
         }
-        let stride = columns.next_multiple_of(LANES);
+        let stride = self.stride;
         for g in [&mut self.gx, &mut self.gy] {
             g.clear();
             g.resize(stride * rows, 0.0);
@@ -356,25 +434,58 @@ impl Window {
                 gy[x] = 0.5 * ((b0[x] - t0[x]) + (b1[x] - t1[x]));
             }
         }
-        (self.x0, self.y0) = (x0 as f64 + 0.5, y0 as f64 + 0.5);
-        (self.rows, self.stride) = (rows, stride);
         Some(())
     }
 
-    /// One step: the corner that the weighted gradients about `q` point at.
+    /// The same for the window of a sharp corner away from the image's left and right border: most windows. Their
+    /// width is known when this is compiled, and rows are read a little beyond their end; weights are zero there.
     #[inline(always)]
-    fn solve(&mut self, cross: &Cross, q: [f64; 2]) -> Option<[f64; 2]> {
-        let mut sums = [[0.0_f32; LANES]; 5];
+    fn fill_sharp(&mut self, image: &Gray, x0: usize, y0: usize) {
+        const N: usize = SHARP_COLUMNS;
+        let smooth = |y: usize| {
+            let [a, b, c]: [&[u8; 2 * N]; 3] =
+                [y.saturating_sub(1), y, (y + 1).min(image.height() - 1)]
+                    .map(|y| image.row(y)[x0 - 1..].first_chunk().expect("the caller has looked"));
+            let column: [u16; 2 * N] =
+                array::from_fn(|i| u16::from(a[i]) + 2 * u16::from(b[i]) + u16::from(c[i]));
+            let mut out = [0.0_f32; N + LANES];
+            for i in 0..N + LANES {
+                let sum = column[i] + 2 * column[i + 1] + column[i + 2];
+                out[i] = f32::from(sum) * (1.0 / 16.0);
+            }
+            out
+        };
+        for g in [&mut self.gx, &mut self.gy] {
+            g.resize(self.rows * N, 0.0);
+        }
+        let mut top = smooth(y0);
+        let (gx, gy) = (self.gx.as_chunks_mut::<N>().0, self.gy.as_chunks_mut::<N>().0);
+        for (y, (gx, gy)) in gx.iter_mut().zip(gy).enumerate() {
+            let bottom = smooth(y0 + y + 1);
+            for x in 0..N {
+                let (right, left) = (bottom[x + 1] - top[x], top[x + 1] - bottom[x]);
+                // Half of (t1 − t0) + (b1 − b0) and of (b0 − t0) + (b1 − t1).
+                gx[x] = 0.5 * (right + left);
+                gy[x] = 0.5 * (right - left);
+            }
+            top = bottom;
+        }
+    }
+
+    /// The sums Σ w g gᵀ(p − q), and how fast they fall as q moves; `None` where no two edges cross.
+    #[inline(always)]
+    fn slope(&self, cross: &Cross, q: [f64; 2]) -> Option<(Slope, [f64; 2])> {
+        let mut sums = [[0.0_f32; LANES]; 9];
         let first_dx = (self.x0 - q[0]) as f32;
         for y in 0..self.rows {
             let dy = (self.y0 + y as f64 - q[1]) as f32;
-            let gx = self.gx[y * self.stride..][..self.stride].chunks_exact(LANES);
-            let gy = self.gy[y * self.stride..][..self.stride].chunks_exact(LANES);
+            let gx = self.gx[y * self.stride..][..self.stride].as_chunks::<LANES>().0;
+            let gy = self.gy[y * self.stride..][..self.stride].as_chunks::<LANES>().0;
             let mut dx0 = first_dx;
-            for (gx, gy) in gx.zip(gy) {
+            for (gx, gy) in gx.iter().zip(gy) {
                 for k in 0..LANES {
                     let dx = dx0 + k as f32;
-                    let w = cross.weight(dx, dy);
+                    let [w, wa, wb] = cross.weight_and_slope(dx, dy);
                     let (wx, wy) = (w * gx[k], w * gy[k]);
                     let along = gx[k] * dx + gy[k] * dy;
                     sums[0][k] += wx * gx[k];
@@ -382,33 +493,63 @@ impl Window {
                     sums[2][k] += wy * gy[k];
                     sums[3][k] += wx * along;
                     sums[4][k] += wy * along;
+                    let (along_x, along_y) = (along * gx[k], along * gy[k]);
+                    sums[5][k] += along_x * wa;
+                    sums[6][k] += along_x * wb;
+                    sums[7][k] += along_y * wa;
+                    sums[8][k] += along_y * wb;
                 }
                 dx0 += LANES as f32;
             }
         }
-        let [a, b, c, rx, ry] = sums.map(|lanes| lanes.iter().map(|&v| f64::from(v)).sum::<f64>());
-        self.moments = [a, b, c];
+        let [a, b, c, rx, ry, xa, xb, ya, yb] = sums.map(sum);
         let det = a * c - b * b;
         // Two edges of different directions: the smaller eigenvalue is a fair part of the larger.
         if !(det > 0.02 * (a + c) * (a + c) / 4.0) {
             return None;
         }
-        Some([q[0] + (c * rx - b * ry) / det, q[1] + (a * ry - b * rx) / det])
+        // The slope of the weight in pixels: its slope per square times the inverse of the axes.
+        let [u, v] = cross.inverse.map(|row| row.map(f64::from));
+        let moving = Slope([
+            [a + xa * u[0] + xb * v[0], b + xa * u[1] + xb * v[1]],
+            [b + ya * u[0] + yb * v[0], c + ya * u[1] + yb * v[1]],
+        ]);
+        let falls = moving.0[0][0] + moving.0[1][1] > 0.0 && moving.det() > MIN_SLOPE * det;
+        let slope = if falls { moving } else { Slope([[a, b], [b, c]]) };
+        Some((slope, [rx, ry]))
+    }
+
+    /// The sums Σ w g gᵀ(p − q) alone.
+    #[inline(always)]
+    fn pull(&self, cross: &Cross, q: [f64; 2]) -> [f64; 2] {
+        let mut sums = [[0.0_f32; LANES]; 2];
+        let first_dx = (self.x0 - q[0]) as f32;
+        for y in 0..self.rows {
+            let dy = (self.y0 + y as f64 - q[1]) as f32;
+            let gx = self.gx[y * self.stride..][..self.stride].as_chunks::<LANES>().0;
+            let gy = self.gy[y * self.stride..][..self.stride].as_chunks::<LANES>().0;
+            let mut dx0 = first_dx;
+            for (gx, gy) in gx.iter().zip(gy) {
+                for k in 0..LANES {
+                    let dx = dx0 + k as f32;
+                    let along = cross.weight(dx, dy) * (gx[k] * dx + gy[k] * dy);
+                    sums[0][k] += along * gx[k];
+                    sums[1][k] += along * gy[k];
+                }
+                dx0 += LANES as f32;
+            }
+        }
+        sums.map(sum)
     }
 
     /// Standard deviation per coordinate, pixels per grey level of noise.
     ///
-    /// The derivative of Σ w g (gᵀr) by one gradient is w·((gᵀr)·1 + g·rᵀ), and M⁻¹ takes it to the corner. A gradient
+    /// The derivative of Σ w g (gᵀr) by one gradient is w·((gᵀr)·1 + g·rᵀ), and K⁻¹ takes it to the corner. A gradient
     /// is half a difference of 2 × 2 smoothed pixels, so the influence of a smoothed pixel is half the sum, with the
     /// signs of its place, of those of the four gradients it takes part in; smoothing by (1 2 1)/4 along both axes
     /// spreads it over the raw pixels.
     #[inline(always)]
-    fn sigma(&mut self, cross: &Cross, q: [f64; 2]) -> Option<f64> {
-        let [a, b, c] = self.moments;
-        let det = a * c - b * b;
-        if !(det > 0.0) {
-            return None;
-        }
+    fn sigma(&mut self, cross: &Cross, slope: &Slope, q: [f64; 2]) -> f64 {
         // Planes with two rows and columns of zeros before the influences and three after them, which take what
         // spreads: what runs over the end of a row meets the zeros of the next.
         let n = self.stride + 5;
@@ -430,7 +571,7 @@ impl Window {
             let difference_x = &mut difference_x[at..][..n];
             let difference_y = &mut difference_y[at..][..n];
             for x in 0..n {
-                let dx = first_dx + x as f32;
+                let dx = first_dx + x as i32 as f32;
                 let w = cross.weight(dx, dy);
                 let (gx, gy) = (gx[x], gy[x]);
                 let along = gx * dx + gy * dy;
@@ -443,31 +584,28 @@ impl Window {
         let [smooth_x, smooth_y] = halves(&mut self.smooth, size);
         spread(sum_x, difference_x, smooth_x, n);
         spread(sum_y, difference_y, smooth_y, n);
-        // Raw pixels: (1 2 1) along y and then along x, each into the planes that are free again.
-        let m = n * (self.rows + 3);
-        one_two_one(smooth_x, &mut difference_x[..m], n);
-        one_two_one(smooth_y, &mut difference_y[..m], n);
+        // Raw pixels: (1 2 1) along y and then along x, each into the planes that are free again. What a pixel and the
+        // one below it do is alike after this much smoothing: every second row stands for two.
+        let rows = (self.rows + 3).div_ceil(2);
+        for y in 0..rows {
+            let (at, from) = (y * n, 2 * y * n);
+            one_two_one(&smooth_x[from..], &mut difference_x[at..][..n], n);
+            one_two_one(&smooth_y[from..], &mut difference_y[at..][..n], n);
+        }
+        let m = n * rows;
         one_two_one(difference_x, &mut sum_x[..m - 2], 1);
         one_two_one(difference_y, &mut sum_y[..m - 2], 1);
-        // What the last lanes take in too much is zero.
-        let used = (m - 2).next_multiple_of(LANES);
-        sum_x[m - 2..used].fill(0.0);
-        sum_y[m - 2..used].fill(0.0);
-        let mut lanes = [[0.0_f32; LANES]; 3];
-        let (sum_x, sum_y) = (&sum_x[..used], &sum_y[..used]);
-        for (fx, fy) in sum_x.as_chunks::<LANES>().0.iter().zip(sum_y.as_chunks::<LANES>().0) {
-            for k in 0..LANES {
-                lanes[0][k] += fx[k] * fx[k];
-                lanes[1][k] += fx[k] * fy[k];
-                lanes[2][k] += fy[k] * fy[k];
-            }
-        }
-        let [xx, xy, yy] = lanes.map(|lanes| lanes.iter().map(|&v| f64::from(v)).sum::<f64>());
-        // Trace of M⁻¹ V M⁻¹ with M⁻¹ = [c −b; −b a]/det.
-        let trace = ((c * c + b * b) * xx - 2.0 * b * (a + c) * xy + (a * a + b * b) * yy) / det;
-        // The factors left out above: 1/2 of the gradient, 1/16 of the smoothing.
-        Some((0.5 * trace / det).sqrt() / 32.0)
+        let (of_x, of_y) = (&sum_x[..m - 2], &sum_y[..m - 2]);
+        let covariance = [dot(of_x, of_x), dot(of_x, of_y), dot(of_y, of_y)].map(f64::from);
+        let trace = slope.covariance_trace(covariance);
+        // The factors left out above: 1/2 of the gradient, 1/16 of the smoothing, two rows for one.
+        (0.5 * 2.0 * trace).sqrt() / 32.0
     }
+}
+
+/// The sum of all lanes.
+fn sum(lanes: [f32; LANES]) -> f64 {
+    lanes.iter().map(|&v| f64::from(v)).sum()
 }
 
 /// Influences of smoothed pixels, without the factor 1/2, from those of the gradients: rows of `n`. The gradient at the

@@ -12,7 +12,10 @@
 
 use std::array;
 
-use super::{pyramid::Level, simd::vectorized};
+use super::{
+    pyramid::{Level, UNITS},
+    simd::vectorized,
+};
 
 /// A crossing of two edges.
 #[derive(Clone, Copy, Debug)]
@@ -61,7 +64,7 @@ const RING: [(isize, isize); 16] = [
 
 /// What a saddle must have to be one. The strength of a corner of contrast c under this smoothing is about (0.09·c)²,
 /// halved twice by strong blur; noise of σ = 10 grey levels stays below 1.
-const MIN_STRENGTH: f32 = 1.0;
+const MIN_STRENGTH: i32 = (UNITS as i32) * (UNITS as i32);
 /// Difference between bright and dark on the ring, grey levels.
 const MIN_CONTRAST: f32 = 8.0;
 
@@ -76,11 +79,11 @@ const REFERENCE_RANK: usize = 24;
 #[derive(Debug, Default)]
 pub(super) struct Memory {
     /// The latest rows of the response: row y lies at y modulo [`KEPT_ROWS`].
-    response: Vec<f32>,
+    response: Vec<i32>,
     /// For each pixel of a row whether it is a peak.
     flags: Vec<u8>,
     /// Strength and index of the peaks.
-    peaks: Vec<(f32, u32)>,
+    peaks: Vec<(i32, u32)>,
 }
 
 /// Rows of the response kept: a peak is told from the rows above and below.
@@ -101,19 +104,19 @@ pub(super) fn saddles(level: &Level, most: usize, memory: &mut Memory) -> Vec<Sa
     let peaks = &mut memory.peaks;
     if peaks.len() > REFERENCE_RANK {
         let (_, reference, _) =
-            peaks.select_nth_unstable_by(REFERENCE_RANK, |a, b| b.0.total_cmp(&a.0));
-        let least = MIN_RELATIVE_STRENGTH * reference.0;
+            peaks.select_nth_unstable_by(REFERENCE_RANK, |a, b| b.0.cmp(&a.0));
+        let least = (MIN_RELATIVE_STRENGTH * reference.0 as f32) as i32;
         peaks.retain(|peak| peak.0 > least);
     }
     // By strength, then by place: the order must not depend on how the sort works. Most peaks are noise: only what
     // is left of them is sorted.
-    let order = |a: &(f32, u32), b: &(f32, u32)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
+    let order = |a: &(i32, u32), b: &(i32, u32)| b.0.cmp(&a.0).then(a.1.cmp(&b.1));
     if peaks.len() > most {
         peaks.select_nth_unstable_by(most, order);
         peaks.truncate(most);
     }
     let width = level.width;
-    let mut found: Vec<((f32, u32), Saddle)> = peaks
+    let mut found: Vec<((i32, u32), Saddle)> = peaks
         .iter()
         .filter_map(|&peak| {
             let at = peak.1 as usize;
@@ -131,7 +134,7 @@ fn find_peaks(level: &Level, memory: &mut Memory) {
     let margin = RING_RADIUS as usize;
     let Memory { response, flags, peaks } = memory;
     peaks.clear();
-    response.resize(KEPT_ROWS * width, 0.0);
+    response.resize(KEPT_ROWS * width, 0);
     flags.clear();
     flags.resize(width.next_multiple_of(FLAGS), 0);
     for y in 1..height - 1 {
@@ -154,39 +157,38 @@ fn find_peaks(level: &Level, memory: &mut Memory) {
     }
 }
 
-/// −det H at every pixel of a row but its ends.
+/// −det H at every pixel of a row but its ends, in squares of the level's units.
 #[inline(always)]
-fn response_row(level: &Level, y: usize, out: &mut [f32]) {
+fn response_row(level: &Level, y: usize, out: &mut [i32]) {
     let width = level.width;
-    let [a, b, c] = [y - 1, y, y + 1].map(|y| &level.gray[y * width..][..width]);
+    let [a, b, c] = [y - 1, y, y + 1].map(|y| &level.values[y * width..][..width]);
     let n = width - 2;
     let out = &mut out[1..][..n];
     let (a0, a1, a2) = (&a[..n], &a[1..][..n], &a[2..][..n]);
     let (b0, b1, b2) = (&b[..n], &b[1..][..n], &b[2..][..n]);
     let (c0, c1, c2) = (&c[..n], &c[1..][..n], &c[2..][..n]);
     for i in 0..n {
-        let twice = 2.0 * b1[i];
-        let xx = b0[i] + b2[i] - twice;
-        let yy = a1[i] + c1[i] - twice;
-        let xy = 0.25 * ((a0[i] + c2[i]) - (a2[i] + c0[i]));
-        out[i] = xy * xy - xx * yy;
+        // Values are at most 255 · 32: four of them fit into 16 bits, and what is left of the products into 32.
+        let twice = 2 * b1[i];
+        let xx = i32::from(b0[i] + b2[i] - twice);
+        let yy = i32::from(a1[i] + c1[i] - twice);
+        let four_xy = i32::from((a0[i] + c2[i]) - (a2[i] + c0[i]));
+        out[i] = ((four_xy * four_xy) >> 4) - xx * yy;
     }
 }
 
 /// Flags the pixels that exceed [`MIN_STRENGTH`] and their eight neighbours. The flags are those of the middle of the
 /// rows: as many as they have pixels but for [`RING_RADIUS`] at each end.
 #[inline(always)]
-fn flag_peaks(rows: [&[f32]; 3], flags: &mut [u8]) {
+fn flag_peaks(rows: [&[i32]; 3], flags: &mut [u8]) {
     let (n, first) = (flags.len(), RING_RADIUS as usize - 1);
     let [[a0, a1, a2], [b0, b1, b2], [c0, c1, c2]] =
         rows.map(|row| [0, 1, 2].map(|dx| &row[first + dx..][..n]));
-    // Not `f32::max`, which must mind NaN.
-    let max = |a: f32, b: f32| if a > b { a } else { b };
     for i in 0..n {
         let s = b1[i];
         // A strict order among equals, so that a plateau yields one peak.
-        let before = max(max(max(a0[i], a1[i]), a2[i]), max(b0[i], MIN_STRENGTH));
-        let after = max(max(max(c0[i], c1[i]), c2[i]), b2[i]);
+        let before = a0[i].max(a1[i]).max(a2[i]).max(b0[i]).max(MIN_STRENGTH);
+        let after = c0[i].max(c1[i]).max(c2[i]).max(b2[i]);
         flags[i] = u8::from(s > before && s >= after);
     }
 }
@@ -195,11 +197,14 @@ fn flag_peaks(rows: [&[f32]; 3], flags: &mut [u8]) {
 fn examine(level: &Level, x: usize, y: usize) -> Option<Saddle> {
     const R: usize = RING_RADIUS as usize;
     // Rows of the neighbourhood, so that its pixels need no check each.
-    let rows: [&[f32; 2 * R + 1]; 2 * R + 1] = array::from_fn(|k| {
+    let rows: [&[i16; 2 * R + 1]; 2 * R + 1] = array::from_fn(|k| {
         let start = (y + k - R) * level.width + x - R;
-        level.gray[start..].first_chunk().expect("a peak keeps its ring within the level")
+        level.values[start..].first_chunk().expect("a peak keeps its ring within the level")
     });
-    let at = |dx: isize, dy: isize| rows[(dy + RING_RADIUS) as usize][(dx + RING_RADIUS) as usize];
+    let at = |dx: isize, dy: isize| {
+        let value = rows[(dy + RING_RADIUS) as usize][(dx + RING_RADIUS) as usize];
+        f32::from(value) * (1.0 / f32::from(UNITS))
+    };
     // The saddle of the quadratic through the 3x3 neighbourhood.
     let c = at(0, 0);
     let (gx, gy) = (0.5 * (at(1, 0) - at(-1, 0)), 0.5 * (at(0, 1) - at(0, -1)));
@@ -214,7 +219,10 @@ fn examine(level: &Level, x: usize, y: usize) -> Option<Saddle> {
         return None;
     }
 
-    let ring = RING.map(|(dx, dy)| at(dx, dy));
+    let mut ring = [0.0; 16];
+    for (value, (dx, dy)) in ring.iter_mut().zip(RING) {
+        *value = at(dx, dy);
+    }
     let middle = c + 0.5 * (gx * dx + gy * dy); // The value at the saddle itself.
     let bright = (0..16).fold(0_u16, |bits, k| bits | u16::from(ring[k] > middle) << k);
     // Bit k: the ring crosses the middle between k and k + 1.

@@ -4,7 +4,7 @@ use crate::{geom::Pixel, image::Gray};
 
 use super::{
     Detector, Observation,
-    detector::{MIN_NODES, factors, most_saddles},
+    detector::{factors, most_saddles},
     lattice::lattices,
     pyramid::Level,
     saddle::{self, saddles},
@@ -22,7 +22,7 @@ pub struct Trace {
     pub level: Gray,
     /// Crossings of two edges, strongest first: place, and unit vectors along the four edges.
     pub saddles: Vec<(Pixel, [[f64; 2]; 4])>,
-    /// Lattices of at least six nodes, largest first: the nodes' numbers along both axes and their places.
+    /// Lattices of at least six nodes (all nodes of smaller boards), largest first: the nodes' numbers along both axes and their places.
     pub lattices: Vec<Vec<([i32; 2], Pixel)>>,
     /// What came of it.
     pub observation: Observation,
@@ -37,14 +37,13 @@ impl Detector {
                 continue;
             }
             let saddles = saddles(&level, most_saddles(&level), &mut memory);
-            let lattices = lattices(&level, &saddles, MIN_NODES);
+            let lattices = lattices(&level, &saddles, self.min_nodes());
             if lattices.is_empty() {
                 continue;
             }
-            let pixels = level.gray.iter().map(|v| (v + 0.5) as u8).collect();
             return Some(Trace {
                 factor,
-                level: Gray::new(level.width, level.height, pixels),
+                level: level.to_gray(),
                 saddles: saddles
                     .iter()
                     .map(|s| (level.to_image(s.x, s.y), s.edges.map(|e| e.map(f64::from))))

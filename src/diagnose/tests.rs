@@ -183,7 +183,7 @@ impl World {
                 layout: Layout::Legacy,
                 mirrored: self.mirrored,
                 inverted: false,
-                n_markers: 10,
+                markers: (0..10).collect(),
                 margin: 50.0,
             };
             observations.push(Observation {

@@ -39,42 +39,63 @@ impl Gray {
 
     /// Bilinear interpolation; `None` outside the rectangle of pixel centres.
     pub fn bilinear(&self, at: Pixel) -> Option<f64> {
-        let (x, y) = (at.x, at.y);
-        if !(x >= 0.0 && y >= 0.0 && x <= self.width as f64 - 1.0 && y <= self.height as f64 - 1.0)
-        {
+        if !self.contains(at) {
             return None;
         }
-        // On the last row or column the neighbour has weight zero; clamp its index.
-        let (x0, y0) = (x as usize, y as usize);
-        let (x1, y1) = ((x0 + 1).min(self.width - 1), (y0 + 1).min(self.height - 1));
-        let (fx, fy) = (x - x0 as f64, y - y0 as f64);
-        let p = |x: usize, y: usize| f64::from(self.pixels[y * self.width + x]);
-        let top = p(x0, y0) * (1.0 - fx) + p(x1, y0) * fx;
-        let bottom = p(x0, y1) * (1.0 - fx) + p(x1, y1) * fx;
-        Some(top * (1.0 - fy) + bottom * fy)
+        let (x, y) = (at.x, at.y);
+        let ([a, b, c, d], [fx, fy]) = self.around(x, y);
+        let [a, b, c, d] = [a, b, c, d].map(f64::from);
+        let (top, bottom) = (a + (b - a) * fx, c + (d - c) * fx);
+        Some(top + (bottom - top) * fy)
+    }
+
+    /// True within the rectangle of pixel centres.
+    #[inline]
+    pub(crate) fn contains(&self, at: Pixel) -> bool {
+        let (right, bottom) = (self.width as f64 - 1.0, self.height as f64 - 1.0);
+        at.x >= 0.0 && at.y >= 0.0 && at.x <= right && at.y <= bottom
+    }
+
+    /// As [`bilinear`](Self::bilinear), of a place that this image [`contains`](Self::contains); elsewhere what the
+    /// nearest row and column show.
+    #[inline]
+    pub(crate) fn between(&self, at: Pixel) -> f32 {
+        let (right, bottom) = (self.width as f64 - 1.0, self.height as f64 - 1.0);
+        // Rounding may step over the border by less than anybody can see.
+        let ([a, b, c, d], [fx, fy]) =
+            self.around(at.x.max(0.0).min(right), at.y.max(0.0).min(bottom));
+        let [a, b, c, d] = [a, b, c, d].map(f32::from);
+        let (fx, fy) = (fx as f32, fy as f32);
+        let (top, bottom) = (a + (b - a) * fx, c + (d - c) * fx);
+        top + (bottom - top) * fy
+    }
+
+    /// The four pixels round a place inside, and how far it lies from the first of them.
+    #[inline(always)]
+    fn around(&self, x: f64, y: f64) -> ([u8; 4], [f64; 2]) {
+        // By way of 32 bits, for which processors have an instruction.
+        let (x0, y0) = (x as i32, y as i32);
+        let f = [x - f64::from(x0), y - f64::from(y0)];
+        let (x0, y0) = (x0 as usize, y0 as usize);
+        let at = y0 * self.width + x0;
+        // On the last row or column the neighbour has weight zero: any pixel will do.
+        let right = usize::from(x0 + 1 < self.width);
+        let below = if y0 + 1 < self.height { self.width } else { 0 };
+        let p = |index: usize| self.pixels[index];
+        ([p(at), p(at + right), p(at + below), p(at + below + right)], f)
     }
 
     /// `N` values, at least two, at equal steps from one place to another, both included, by bilinear interpolation;
     /// `None` where either lies outside the rectangle of pixel centres.
     pub fn along<const N: usize>(&self, from: Pixel, to: Pixel) -> Option<[f32; N]> {
-        let (right, bottom) = (self.width as f64 - 1.0, self.height as f64 - 1.0);
-        let inside = |p: Pixel| p.x >= 0.0 && p.y >= 0.0 && p.x <= right && p.y <= bottom;
-        if !(inside(from) && inside(to)) {
+        if !(self.contains(from) && self.contains(to)) {
             return None; // Between two places inside, all are.
         }
         let step = [(to.x - from.x) / (N as f64 - 1.0), (to.y - from.y) / (N as f64 - 1.0)];
         let mut values = [0.0; N];
         for (k, value) in values.iter_mut().enumerate() {
-            // Rounding may step over the border by less than anybody can see.
-            let x = (from.x + k as f64 * step[0]).clamp(0.0, right);
-            let y = (from.y + k as f64 * step[1]).clamp(0.0, bottom);
-            let (x0, y0) = (x as usize, y as usize);
-            let (x1, y1) = ((x0 + 1).min(self.width - 1), (y0 + 1).min(self.height - 1));
-            let (fx, fy) = ((x - x0 as f64) as f32, (y - y0 as f64) as f32);
-            let (top, bottom) = (self.row(y0), self.row(y1));
-            let [a, b, c, d] = [top[x0], top[x1], bottom[x0], bottom[x1]].map(f32::from);
-            let (top, bottom) = (a + (b - a) * fx, c + (d - c) * fx);
-            *value = top + (bottom - top) * fy;
+            let k = k as f64;
+            *value = self.between(Pixel::new(from.x + k * step[0], from.y + k * step[1]));
         }
         Some(values)
     }

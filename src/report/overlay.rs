@@ -17,7 +17,8 @@ pub struct Overlay {
     pub corners: Vec<(usize, Pixel)>,
     /// Lines between neighbouring corners.
     pub lattice: Vec<[Pixel; 2]>,
-    /// Outlines of the markers, where the corners say they must be; those that leave the image are left out.
+    /// Outlines of the markers that were identified, where the corners say they must be: those that voted. Markers that
+    /// are hidden, or leave the image, have none.
     pub markers: Vec<[Pixel; 4]>,
     /// Candidates that were not taken.
     pub rejects: Vec<Pixel>,
@@ -154,7 +155,9 @@ fn markers(
     let inside = |p: &Pixel| {
         p.x >= -0.5 && p.y >= -0.5 && p.x <= size.0 as f64 - 0.5 && p.y <= size.1 as f64 - 0.5
     };
-    let outlines = board.markers(identity.layout).into_iter().filter_map(|cell| {
+    let voted = |id: &usize| identity.markers.binary_search(id).is_ok();
+    let markers = board.markers(identity.layout).into_iter().filter(|cell| voted(&cell.id));
+    let outlines = markers.filter_map(|cell| {
         let x = cell.column as f64 * board.square_m + margin_m;
         let y = cell.row as f64 * board.square_m + margin_m;
         let side = board.marker_m;
@@ -340,7 +343,7 @@ mod tests {
             layout: Layout::Legacy,
             mirrored: false,
             inverted: false,
-            n_markers: 4,
+            markers: (0..40).collect(),
             margin: 50.0,
         };
         Observation {
@@ -365,6 +368,11 @@ mod tests {
         // In a smaller image the markers outside are not drawn.
         let cut = Overlay::new(&observation(&board, 63), &board, (120, 480));
         assert!(cut.markers.len() < 40 && cut.markers.iter().flatten().all(|p| p.x < 120.0));
+        // Nor those that did not vote.
+        let mut partly = observation(&board, 63);
+        partly.identity.as_mut().unwrap().markers = vec![0, 3, 39];
+        let partly = Overlay::new(&partly, &board, (640, 480));
+        assert_eq!(partly.markers, [0, 3, 39].map(|id| overlay.markers[id]));
         assert!(Overlay::new(&observation(&board, 5), &board, (640, 480)).markers.is_empty());
         // One row of corners lies on a line: no homography, no markers.
         assert!(Overlay::new(&observation(&board, 9), &board, (640, 480)).markers.is_empty());

@@ -215,7 +215,7 @@ fn frame_audit(frame: usize, board: &CharucoBoard) -> FrameAudit {
         layout: Layout::Legacy,
         mirrored: false,
         inverted: false,
-        n_markers: 38,
+        markers: (0..38).collect(),
         margin: 410.0,
     };
     let rejects =

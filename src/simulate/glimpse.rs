@@ -56,7 +56,7 @@ impl Plan {
             layout: self.board.layout.unwrap_or(Layout::Legacy),
             mirrored: self.is_mirrored(),
             inverted: false,
-            n_markers: corners.len() / 2,
+            markers: (0..corners.len() / 2).collect(),
             margin: 100.0,
         });
         let depth =

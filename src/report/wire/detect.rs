@@ -60,7 +60,7 @@ impl DetectedImage {
 }
 
 /// How a board was told from all others.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DetectedIdentity {
     /// The image shows the board mirrored; ids are still those of the board.
     pub mirrored: bool,
@@ -68,14 +68,23 @@ pub struct DetectedIdentity {
     pub inverted: bool,
     /// Markers that voted.
     pub n_markers: usize,
+    /// Their ids, ascending.
+    #[serde(default)]
+    pub marker_ids: Vec<usize>,
     /// Lead over the runner-up placement, as a log-likelihood ratio in nats.
     pub margin_nats: Option<f64>,
 }
 
 impl From<&Identity> for DetectedIdentity {
     fn from(identity: &Identity) -> Self {
-        let Identity { mirrored, inverted, n_markers, margin, .. } = *identity;
-        Self { mirrored, inverted, n_markers, margin_nats: finite(margin) }
+        let Identity { mirrored, inverted, ref markers, margin, .. } = *identity;
+        Self {
+            mirrored,
+            inverted,
+            n_markers: markers.len(),
+            marker_ids: markers.clone(),
+            margin_nats: finite(margin),
+        }
     }
 }
 
