@@ -109,7 +109,9 @@ impl Detector {
     ) -> Option<Found> {
         let saddles = saddles(level, most_saddles(level), memory);
         let mut identified: Option<Found> = None;
-        for mut lattice in lattices(level, &saddles, self.min_nodes()).into_iter().take(MOST_LATTICES) {
+        for mut lattice in
+            lattices(level, &saddles, self.min_nodes()).into_iter().take(MOST_LATTICES)
+        {
             if identified.is_some() {
                 rejects.push(Reject { pixel: lattice.middle(), reason: Reason::SecondLattice });
                 continue;

@@ -103,8 +103,7 @@ pub(super) fn saddles(level: &Level, most: usize, memory: &mut Memory) -> Vec<Sa
     );
     let peaks = &mut memory.peaks;
     if peaks.len() > REFERENCE_RANK {
-        let (_, reference, _) =
-            peaks.select_nth_unstable_by(REFERENCE_RANK, |a, b| b.0.cmp(&a.0));
+        let (_, reference, _) = peaks.select_nth_unstable_by(REFERENCE_RANK, |a, b| b.0.cmp(&a.0));
         let least = (MIN_RELATIVE_STRENGTH * reference.0 as f32) as i32;
         peaks.retain(|peak| peak.0 > least);
     }

@@ -69,7 +69,9 @@ fn errors(rendered: &Rendered, seen: &Observation) -> Vec<([f64; 2], f64)> {
 fn corners_are_accurate_unbiased_and_know_their_sigma() {
     let board = board(PAPER);
     let detector = Detector::new(&board);
-    for (blur_sigma_px, noise) in [(0.6, 1.0), (0.9, 3.0), (1.2, 3.0)] {
+    for (blur_sigma_px, noise) in
+        [(0.5, 1.0), (0.6, 1.0), (0.9, 3.0), (1.2, 3.0), (1.6, 3.0), (2.0, 3.0), (2.0, 1.0)]
+    {
         let mut all = Vec::new();
         let mut n_true = 0;
         for (index, color_from_board) in views(&board).into_iter().enumerate() {
@@ -91,9 +93,18 @@ fn corners_are_accurate_unbiased_and_know_their_sigma() {
              normalised variance {variance:.2}",
             bias[0], bias[1]
         );
-        assert!(rms < 0.05, "blur {blur_sigma_px}, noise {noise}: rms {rms} px");
+        // Asked for blur up to 1.2 px.
+        assert!(
+            rms < if blur_sigma_px > 1.2 { 0.08 } else { 0.05 },
+            "blur {blur_sigma_px}, noise {noise}: rms {rms} px"
+        );
         assert!(bias[0].abs().max(bias[1].abs()) < 0.01, "bias {bias:?} px");
-        assert!((0.8..1.2).contains(&variance), "blur {blur_sigma_px}, noise {noise}: {variance}");
+        // Where blur is wide and noise low, σ is what print and lens leave: this simulation has none of that.
+        let least = if blur_sigma_px > 1.2 && noise < 3.0 { 0.5 } else { 0.8 };
+        assert!(
+            (least..1.2).contains(&variance),
+            "blur {blur_sigma_px}, noise {noise}: {variance}"
+        );
     }
 }
 
@@ -140,6 +151,7 @@ fn other_boards_and_sizes() {
         ("9x6:25mm:18mm:APRILTAG_36h11", 800, 600, 700.0, 0.4),
         ("8x6:30mm:22mm:7X7_250", 4032, 3024, 3000.0, 0.4),
         ("6x4:30mm:22mm:4X4_50", 160, 120, 130.0, 0.3),
+        ("3x3:30mm:22mm:4X4_50", 640, 480, 600.0, 0.3), // four corners
     ] {
         let board = board(text);
         let mut scene = Scene::ideal(
@@ -162,6 +174,27 @@ fn other_boards_and_sizes() {
             .count();
         assert!(found >= whole, "{text}: {found} of {whole} corners: {:?}", seen.rejects);
     }
+}
+
+/// Inside a board of even rows and odd columns both layouts show the same, one column apart: only who knows the layout
+/// can number it, and nobody else does.
+#[test]
+fn a_view_that_fits_both_layouts_asks_for_the_word_of_the_printer() {
+    let unknown = board("11x8:30mm:21mm:6X6_250");
+    let known = board("11x8:30mm:21mm:6X6_250:legacy");
+    let mut scene = Scene::ideal(
+        unknown.clone(),
+        camera(900.0, 640, 480),
+        pose(&unknown, 0.30, [12.0, -8.0, 0.0]),
+    );
+    scene.print.layout = Layout::Legacy;
+    scene.blur_sigma_px = 0.8;
+    let rendered = render(&scene, 5);
+    let inside = Detector::new(&unknown).detect(&rendered.gray());
+    assert!(inside.corners.is_empty(), "{:?}", inside.identity);
+    assert!(inside.rejects.iter().any(|r| r.reason == Reason::Ambiguous));
+    let seen = Detector::new(&known).detect(&rendered.gray());
+    assert!(errors(&rendered, &seen).len() >= 12, "{:?}", seen.rejects);
 }
 
 #[test]
