@@ -22,7 +22,8 @@ pub struct Trace {
     pub level: Gray,
     /// Crossings of two edges, strongest first: place, and unit vectors along the four edges.
     pub saddles: Vec<(Pixel, [[f64; 2]; 4])>,
-    /// Lattices of at least six nodes (all nodes of smaller boards), largest first: the nodes' numbers along both axes and their places.
+    /// Lattices of at least six nodes (four, where the board has no more), largest
+    /// first: the nodes' numbers along both axes and their places.
     pub lattices: Vec<Vec<([i32; 2], Pixel)>>,
     /// What came of it.
     pub observation: Observation,
