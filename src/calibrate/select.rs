@@ -24,8 +24,9 @@ const PRIOR_SHARE: f64 = 1e-6;
 /// there are no more than that, or the views say nothing.
 ///
 /// Greedy D-optimal design (Fedorov, *Theory of optimal experiments*, 1972): the next view is the one whose
-/// information, its pose eliminated, lets the determinant of the information gathered so far grow most. That finds at least 1 − 1/e
-/// of the best choice's gain, since the gain only shrinks with what is known already (Nemhauser, Wolsey, Fisher 1978).
+/// information, its pose eliminated, lets the determinant of the information gathered so far grow most. That finds at
+/// least 1 − 1/e of the best choice's gain, since the gain only shrinks with what is known already (Nemhauser, Wolsey,
+/// Fisher 1978).
 ///
 /// Of views that show the same picture one is taken before any gets a second: what is wrong in one is wrong in the
 /// others, and σ, found from the scatter between pictures, must not be diluted.

@@ -459,7 +459,6 @@ fn few_of_many_views() {
     }
     // 40 of 60 pictures, one of five views each: the root of 7.5 is 2.7 where all views tell the same.
     assert!(mean(&ratios) < 2.3, "{ratios:?}");
-    println!("σ as a share of all views': {ratios:?}, of an even spread's: {against_even:?}");
     assert!(mean(&against_even) < 1.0, "{against_even:?}");
     assert!(squares < 2.0, "{squares}");
 }

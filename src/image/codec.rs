@@ -441,8 +441,12 @@ mod tests {
     fn every_colour_type_and_bit_depth() {
         use png::{BitDepth, ColorType};
         let plain = |_: &mut png::Encoder<'_, &mut Vec<u8>>| ();
-        let gray =
-            |bytes: &[u8]| Gray::from_png(bytes, &Limits::default()).unwrap().pixels().to_vec();
+        // An audit reads either, and must come to the same.
+        let gray = |bytes: &[u8]| {
+            let gray = Gray::from_png(bytes, &Limits::default()).unwrap();
+            assert_eq!(Rgb::from_png(bytes, &Limits::default()).unwrap().to_gray(), gray);
+            gray.pixels().to_vec()
+        };
         let rgb =
             |bytes: &[u8]| Rgb::from_png(bytes, &Limits::default()).unwrap().pixels().to_vec();
 
