@@ -3,9 +3,8 @@
 
     python3 bench/correct_memory.py RECORDING [FRAMES ...]        (50 500 5000; needs 0.5 MB per frame and side)
 
-Frames are those of the recording over and over, hard-linked under new timestamps; depth is zoomed, colour and depth are
-undistorted by a lens that is told (--fault distorted where there are tables). Expects target/release/truedepth, or
-TRUEDEPTH.
+Frames are those of the recording over and over, hard-linked under new timestamps; depth is zoomed, colour is carried
+over as it is. Expects target/release/truedepth, or TRUEDEPTH.
 """
 import json, os, resource, shutil, subprocess, sys, tempfile, time
 from pathlib import Path
