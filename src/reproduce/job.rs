@@ -66,7 +66,7 @@ struct Calibrated {
 
 /// Reproduces the paper from these recordings; `observer` is told what is being worked on.
 ///
-/// Errors: as [`audit`]: a file that cannot be read or decoded.
+/// Errors: as [`audit()`]: a file that cannot be read or decoded.
 pub fn reproduce(
     place: &str,
     data: Vec<Data>,
