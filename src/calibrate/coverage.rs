@@ -1,7 +1,11 @@
 //! Where the views stood, and which are missing.
 
 use super::{Calibration, Input, views};
-use crate::pose::{View, Weighting};
+use crate::{
+    detect::Corner,
+    geom::{Board, Color, Pose},
+    pose::{View, Weighting},
+};
 
 /// The image is looked at in so many cells each way.
 const CELLS: usize = 3;
@@ -39,35 +43,56 @@ pub struct Tilt {
 /// What the views of a calibration cover: all frames in which a pose can be found with the factory's intrinsics.
 pub fn coverage(input: &Input<'_>) -> Coverage {
     let gathered = views::all_usable(input, 4, Weighting::Equal);
-    let views: Vec<_> = gathered.views.iter().map(|v| (v.frame, &v.pose, &v.corners)).collect();
-    let mut coverage = Coverage {
-        views: Vec::with_capacity(views.len()),
-        columns: CELLS,
-        rows: CELLS,
-        n_corners: vec![0; CELLS * CELLS],
-    };
-    let cell = |at: f64, size: usize| {
-        (((at + 0.5) / size as f64 * CELLS as f64).max(0.0) as usize).min(CELLS - 1)
-    };
-    for (frame, pose, corners) in views {
-        // Into the board: it leans to where the board is nearest.
-        let normal = pose.rotation.matrix().column(2).into_owned();
-        let flip = if normal.z < 0.0 { -1.0 } else { 1.0 };
-        coverage.views.push(Tilt {
-            frame,
-            tilt_deg: normal.z.abs().min(1.0).acos().to_degrees(),
-            nearest_deg: (flip * normal.y).atan2(flip * normal.x).to_degrees(),
-        });
-        for corner in corners {
-            let column = cell(corner.pixel.x, input.factory.width);
-            let row = cell(corner.pixel.y, input.factory.height);
-            coverage.n_corners[row * CELLS + column] += 1;
-        }
-    }
-    coverage
+    let views = gathered.views.iter().map(|v| (v.frame, &v.pose, v.corners.as_slice()));
+    Coverage::of(views, [input.factory.width, input.factory.height])
 }
 
 impl Coverage {
+    /// The parts of the image, row by row from the top left.
+    pub const PLACES: [&str; CELLS * CELLS] = [
+        "top left",
+        "top",
+        "top right",
+        "left",
+        "middle",
+        "right",
+        "bottom left",
+        "bottom",
+        "bottom right",
+    ];
+
+    /// What these views (index of the frame, pose, corners) cover of an image of so many columns and rows.
+    pub fn of<'a>(
+        views: impl Iterator<Item = (usize, &'a Pose<Color, Board>, &'a [Corner])>,
+        [width, height]: [usize; 2],
+    ) -> Self {
+        let mut coverage = Self {
+            views: Vec::new(),
+            columns: CELLS,
+            rows: CELLS,
+            n_corners: vec![0; CELLS * CELLS],
+        };
+        let cell = |at: f64, size: usize| {
+            (((at + 0.5) / size as f64 * CELLS as f64).max(0.0) as usize).min(CELLS - 1)
+        };
+        for (frame, pose, corners) in views {
+            // Into the board: it leans to where the board is nearest.
+            let normal = pose.rotation.matrix().column(2).into_owned();
+            let flip = if normal.z < 0.0 { -1.0 } else { 1.0 };
+            coverage.views.push(Tilt {
+                frame,
+                tilt_deg: normal.z.abs().min(1.0).acos().to_degrees(),
+                nearest_deg: (flip * normal.y).atan2(flip * normal.x).to_degrees(),
+            });
+            for corner in corners {
+                let column = cell(corner.pixel.x, width);
+                let row = cell(corner.pixel.y, height);
+                coverage.n_corners[row * CELLS + column] += 1;
+            }
+        }
+        coverage
+    }
+
     /// The sides of the board of which no view has it nearest, tilted by 15° or more: `right`, `bottom`, `left`, `top`.
     pub fn missing_tilts(&self) -> Vec<&'static str> {
         const SIDES: [(f64, &str); 4] =
@@ -85,18 +110,7 @@ impl Coverage {
 
     /// The parts of the image without a corner: `top left`, `middle`, `bottom` and the like.
     pub fn missing_places(&self) -> Vec<&'static str> {
-        const NAMES: [&str; CELLS * CELLS] = [
-            "top left",
-            "top",
-            "top right",
-            "left",
-            "middle",
-            "right",
-            "bottom left",
-            "bottom",
-            "bottom right",
-        ];
-        let empty = self.n_corners.iter().zip(NAMES).filter(|(n, _)| **n == 0);
+        let empty = self.n_corners.iter().zip(Self::PLACES).filter(|(n, _)| **n == 0);
         empty.map(|(_, name)| name).collect()
     }
 

@@ -377,6 +377,12 @@ pub(super) struct Place {
 }
 
 impl Place {
+    /// Where a pixel of the depth map looks in the colour image.
+    pub(super) fn looked_at(&self, at: Pixel) -> Pixel {
+        let from = self.off_center(at);
+        Pixel::new(self.center.x + self.zoom * from.x, self.center.y + self.zoom * from.y)
+    }
+
     fn off_center(&self, at: Pixel) -> Vector2<f64> {
         let [dx, dy] = self.shift_px;
         Vector2::new(at.x - dx - self.center.x, at.y - dy - self.center.y)
@@ -485,11 +491,6 @@ mod tests {
         Place { center: CENTER, zoom, shift_px }
     }
 
-    fn looked_at(place: &Place, at: Pixel) -> Pixel {
-        let from = place.off_center(at);
-        Pixel::new(CENTER.x + place.zoom * from.x, CENTER.y + place.zoom * from.y)
-    }
-
     /// Normal numbers, always the same ones.
     struct Noise(u64);
 
@@ -512,7 +513,7 @@ mod tests {
     ) -> DepthMap {
         let mut depth = |i: usize| {
             let at = Pixel::new((i % 640) as f64, (i / 640) as f64);
-            let on = spot(frame, looked_at(truth, at)).on_board_m;
+            let on = spot(frame, truth.looked_at(at)).on_board_m;
             let dark = match board.is_white_at(Layout::Legacy, on.x, on.y) {
                 Some(false) => 0.5,
                 _ => -0.5,
@@ -534,7 +535,7 @@ mod tests {
             .collect();
         let textures: Vec<&Texture> = textures.iter().collect();
         find(&Print::new(&board), place(1.0, [0.0; 2]), &textures, |frame, place, at| {
-            Some(spot(frame, looked_at(place, at)))
+            Some(spot(frame, place.looked_at(at)))
         })
     }
 

@@ -181,12 +181,9 @@ pub fn register(input: &RegisterInput<'_>) -> Option<Registration> {
         }
     }
     let (planes, step) = found?;
-    let start = Place { center: scene.center, zoom: theta[2], shift_px: [theta[3], theta[4]] };
     let textures: Vec<&Texture> = frames.iter().map(|(_, patches)| &patches.texture).collect();
-    let imprint = imprint::find(&Print::new(board), start, &textures, |frame, place, at| {
-        let at_place = Numbers::from([1.0, 0.0, place.zoom, place.shift_px[0], place.shift_px[1]]);
-        scene.spot(frames[frame].0, scene.looked_at(at, &at_place))
-    });
+    let look = |frame: usize, place: &Place, at| scene.spot(frames[frame].0, place.looked_at(at));
+    let imprint = imprint::find(&Print::new(board), scene.place(&theta), &textures, look);
     Some(assemble(input, &scene, &frames, &theta, (&planes, &step, imprint)))
 }
 
@@ -230,11 +227,11 @@ pub(super) struct Plane {
 impl Scene<'_> {
     /// Where a depth pixel looks.
     fn looked_at(&self, at: Pixel, theta: &Numbers) -> Pixel {
-        let (zoom, dx, dy) = (theta[2], theta[3], theta[4]);
-        Pixel::new(
-            self.center.x + zoom * (at.x - dx - self.center.x),
-            self.center.y + zoom * (at.y - dy - self.center.y),
-        )
+        self.place(theta).looked_at(at)
+    }
+
+    fn place(&self, theta: &Numbers) -> Place {
+        Place { center: self.center, zoom: theta[2], shift_px: [theta[3], theta[4]] }
     }
 
     /// The board's depth along a ray; `None` beside the board.

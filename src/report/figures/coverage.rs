@@ -15,45 +15,12 @@ use crate::{
     },
 };
 
-/// The image is told apart into so many parts each way, as [`Coverage`] names them.
-const PARTS: usize = 3;
-const PART_NAMES: [&str; PARTS * PARTS] = [
-    "top left",
-    "top",
-    "top right",
-    "left",
-    "middle",
-    "right",
-    "bottom left",
-    "bottom",
-    "bottom right",
-];
 /// Between these angles a view says most about the focal length.
 const BEST_DEG: [f64; 2] = [20.0, 45.0];
 
-/// What the views cover, with the parts of the image that each corner lies in.
-fn coverage_of(views: &[&View], [width, height]: [usize; 2]) -> Coverage {
-    let part = |at: f64, size: usize| {
-        (((at + 0.5) / size as f64 * PARTS as f64).max(0.0) as usize).min(PARTS - 1)
-    };
-    let mut n_corners = vec![0; PARTS * PARTS];
-    for corner in views.iter().flat_map(|view| &view.corners) {
-        n_corners[part(corner.pixel.y, height) * PARTS + part(corner.pixel.x, width)] += 1;
-    }
-    let tilts = views.iter().map(|view| tilt(view)).collect();
-    Coverage { views: tilts, columns: PARTS, rows: PARTS, n_corners }
-}
-
-fn tilt(view: &View) -> Tilt {
-    let rotation = view.color_from_board.rotation.matrix();
-    let normal = rotation.column(2);
-    // Into the board: it leans to where the board is nearest.
-    let flip = if normal.z < 0.0 { -1.0 } else { 1.0 };
-    Tilt {
-        frame: view.frame,
-        tilt_deg: view.tilt_rad().to_degrees(),
-        nearest_deg: (flip * normal.y).atan2(flip * normal.x).to_degrees(),
-    }
+fn coverage_of(views: &[&View], size: [usize; 2]) -> Coverage {
+    let views = views.iter().map(|v| (v.frame, &v.color_from_board, v.corners.as_slice()));
+    Coverage::of(views, size)
 }
 
 /// What is missing, in a sentence.
@@ -86,13 +53,19 @@ pub(in crate::report) fn image_coverage(audit: &Audit) -> Option<Figure> {
             )
         })
         .collect();
-    let (width, height) = (WIDTH / PARTS as f64, drawn_height / PARTS as f64);
+    let columns = coverage.columns;
+    let (width, height) = (WIDTH / columns as f64, drawn_height / coverage.rows as f64);
     let parts: Vec<(f64, f64, &str, usize)> = coverage
         .n_corners
         .iter()
         .enumerate()
         .map(|(i, &corners)| {
-            (width * (i % PARTS) as f64, height * (i / PARTS) as f64, PART_NAMES[i], corners)
+            (
+                width * (i % columns) as f64,
+                height * (i / columns) as f64,
+                Coverage::PLACES[i],
+                corners,
+            )
         })
         .collect();
     let drawing = html! {

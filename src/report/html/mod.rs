@@ -17,8 +17,23 @@ use super::{
 use crate::audit::Audit;
 
 /// Nothing may be loaded, from anywhere: images come as `data:`, style and script stand in the page.
-pub(super) const POLICY: &str = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; \
+const POLICY: &str = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; \
                                  script-src 'unsafe-inline'; base-uri 'none'; form-action 'none'";
+
+/// The head of every page: the same look and the same policy, with what this page adds to the style.
+pub(super) fn head(title: &str, style: &str) -> Markup {
+    html! {
+        head {
+            meta charset="utf-8";
+            meta name="viewport" content="width=device-width, initial-scale=1";
+            meta name="color-scheme" content="light dark";
+            meta http-equiv="Content-Security-Policy" content=(POLICY);
+            meta name="generator" content=(concat!("truedepth ", env!("CARGO_PKG_VERSION")));
+            title { (title) }
+            style { (PreEscaped(include_str!("report.css"))) (PreEscaped(style)) }
+        }
+    }
+}
 
 /// The report as one HTML file, with these pictures of the recording (without any it is the numbers alone) and the
 /// commands that follow from what was typed.
@@ -37,15 +52,7 @@ pub fn page(audit: &Audit, pictures: &Pictures, typed: &Typed) -> String {
     let markup = html! {
         (DOCTYPE)
         html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta name="color-scheme" content="light dark";
-                meta http-equiv="Content-Security-Policy" content=(POLICY);
-                meta name="generator" content=(concat!("truedepth ", env!("CARGO_PKG_VERSION")));
-                title { (title) }
-                style { (PreEscaped(include_str!("report.css"))) }
-            }
+            (head(&title, ""))
             body {
                 a class="skip" href="#findings" { "Skip to the findings" }
                 (header(audit, &parts))

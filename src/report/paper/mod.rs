@@ -8,7 +8,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::{
     figures::{self, Figure},
-    html::POLICY,
+    html::head,
     words::{count, plain, signed, unbroken, value_and_sigma},
 };
 use crate::{
@@ -47,15 +47,7 @@ pub fn paper_page(paper: &Reproduction, pictures: &PaperPictures) -> String {
     let markup = html! {
         (DOCTYPE)
         html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta name="color-scheme" content="light dark";
-                meta http-equiv="Content-Security-Policy" content=(POLICY);
-                meta name="generator" content=(concat!("truedepth ", env!("CARGO_PKG_VERSION")));
-                title { "arXiv:2201.10865, reproduced · truedepth" }
-                style { (PreEscaped(include_str!("../html/report.css"))) (PreEscaped(STYLE)) }
-            }
+            (head("arXiv:2201.10865, reproduced · truedepth", STYLE))
             body {
                 a class="skip" href="#findings" { "Skip to the numbers" }
                 (header(paper))
