@@ -225,7 +225,7 @@ fn residuals(
 ) -> Vec<Vec<[f64; 2]>> {
     let of_view = |(view, pose): (&Measured, Pose<Color, Board>)| {
         let of_corner = |(corner, point): (&Corner, &Vector3<f64>)| {
-            let numbers = (form.shared.as_slice(), form.heights_m.as_slice());
+            let numbers = (form.shared.as_slice(), form.knots_m.as_slice());
             let place = prepared.sheet.lifted(surface, (corner.id, point), numbers);
             match camera.project(pose * place) {
                 Some(pixel) => corner.pixel - pixel,
@@ -257,13 +257,13 @@ fn fit_with(input: &Input<'_>, prepared: &Prepared, shape: Shape<'_>, loss: Loss
         let numbers = free[first..first + n_numbers].iter_mut();
         numbers.zip(&prepared.near_warp).for_each(|(number, near)| *number = *near);
     }
-    let mut heights_m = &[][..];
+    let mut knots_m = &[][..];
     if shape.surface == prepared.surface {
         let n_camera = shape.n_camera(&free);
         free[n_camera..].copy_from_slice(&prepared.form.shared);
-        heights_m = &prepared.form.heights_m;
+        knots_m = &prepared.form.knots_m;
     }
-    fit(shape, &data, Start { free: &free, heights_m, poses: &poses })
+    fit(shape, &data, Start { free: &free, knots_m, poses: &poses })
 }
 
 /// The same fit once more, with all that is known of the surface and of the poses.

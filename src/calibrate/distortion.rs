@@ -105,7 +105,7 @@ fn radial_shift_px(factory: &Intrinsics, free: &[f64], radial: &[f64]) -> Option
 /// A function of the free numbers, with the σ that their covariance gives it to first order. NaN and infinite where
 /// the function has no value.
 fn propagate(fit: &Fit, function: impl Fn(&[f64]) -> Option<f64>) -> Estimate {
-    let n = fit.free.len() + fit.heights_m.len();
+    let n = fit.free.len() + fit.knots_m.len();
     let value = function(&fit.free).unwrap_or(f64::NAN);
     let slope: Vec<f64> = (0..fit.free.len())
         .map(|i| {

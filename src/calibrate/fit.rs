@@ -55,7 +55,7 @@ pub(super) struct Start<'a> {
     /// The free numbers, as [`Shape`] orders them.
     pub(super) free: &'a [f64],
     /// The heights of a free surface; those missing are zero.
-    pub(super) heights_m: &'a [f64],
+    pub(super) knots_m: &'a [f64],
     pub(super) poses: &'a [Pose<Color, Board>],
 }
 
@@ -65,9 +65,9 @@ pub(super) struct Fit {
     /// The free numbers, as [`Shape`] orders them.
     pub(super) free: Vec<f64>,
     /// The heights of the board's corners, metres; none unless the surface is free.
-    pub(super) heights_m: Vec<f64>,
+    pub(super) knots_m: Vec<f64>,
     pub(super) poses: Vec<Pose<Color, Board>>,
-    /// Covariance of `free` and after these `heights_m`, row-major; `None` where the views do not determine them. What
+    /// Covariance of `free` and after these `knots_m`, row-major; `None` where the views do not determine them. What
     /// is not the camera's has the larger of both variances only where [`Wanted::Everything`] was.
     pub(super) covariance: Option<Vec<f64>>,
     /// For each picture the (robust, weighted) sum of squares with the intrinsics of all others; infinite where
@@ -83,7 +83,7 @@ pub(super) struct Fit {
 
 impl Fit {
     pub(super) fn estimate(&self, index: usize) -> Estimate {
-        let n = self.free.len() + self.heights_m.len();
+        let n = self.free.len() + self.knots_m.len();
         let variance = self.covariance.as_ref().map_or(f64::INFINITY, |c| c[index * n + index]);
         Estimate { value: self.free[index], sigma: variance.sqrt() }
     }
@@ -96,12 +96,12 @@ impl Fit {
     pub(super) fn form(&self, shape: &Shape<'_>) -> Form {
         Form {
             shared: shape.surface_numbers(&self.free).to_vec(),
-            heights_m: self.heights_m.clone(),
+            knots_m: self.knots_m.clone(),
         }
     }
 
     pub(super) fn start(&self) -> Start<'_> {
-        Start { free: &self.free, heights_m: &self.heights_m, poses: &self.poses }
+        Start { free: &self.free, knots_m: &self.knots_m, poses: &self.poses }
     }
 }
 
@@ -110,7 +110,7 @@ impl Fit {
 pub(super) struct Shutter {
     /// The residuals' standard deviation as a share of what it is without.
     pub(super) share: f64,
-    /// By how much `free` and after these `heights_m` move.
+    /// By how much `free` and after these `knots_m` move.
     pub(super) shift: Vec<f64>,
 }
 
@@ -149,8 +149,8 @@ fn fit_sized<const S: usize>(shape: Shape<'_>, data: &Data<'_>, start: Start<'_>
         sheet: data.sheet,
     };
     let shared: [f64; S] = start.free.try_into().expect("dispatched on the length");
-    let mut loose = start.heights_m.to_vec();
-    loose.resize(data.sheet.n_heights(shape.surface), 0.0);
+    let mut loose = start.knots_m.to_vec();
+    loose.resize(data.sheet.n_knots(shape.surface), 0.0);
     let start = Arrow { shared, loose, blocks: start.poses.to_vec() };
     let effort = Effort { cost_tolerance: data.cost_tolerance, ..Effort::default() };
     let minimum = minimize(&BySchur(&problem), start, effort)?;
@@ -213,7 +213,7 @@ fn fit_sized<const S: usize>(shape: Shape<'_>, data: &Data<'_>, start: Start<'_>
         });
     Some(Fit {
         free: shared.to_vec(),
-        heights_m: loose,
+        knots_m: loose,
         poses,
         covariance,
         held_out,
@@ -240,13 +240,13 @@ fn is_determined<const S: usize>(pooled: &Pooled<'_>, diagonal: &[f64; S], n: us
 fn shutter<const S: usize>(
     problem: &Reprojection<'_, S>,
     normal: &ArrowNormal<S, 6>,
-    (shared, heights_m): (&[f64; S], &[f64]),
+    (shared, knots_m): (&[f64; S], &[f64]),
     poses: &[Pose<Color, Board>],
 ) -> Option<Shutter> {
     let mut all = normal.prior.clone();
     let (mut gain, mut cost, mut n_residuals) = (0.0, 0.0, 0);
     for (index, pose) in poses.iter().enumerate() {
-        let block = problem.moving_view(index, (shared, heights_m), pose)?;
+        let block = problem.moving_view(index, (shared, knots_m), pose)?;
         gain += block.block_gain()?;
         cost += 2.0 * block.cost();
         n_residuals += 2 * problem.views[index].corners.len();
@@ -316,7 +316,7 @@ mod tests {
                 cost_tolerance: 1e-12,
                 wanted: Wanted::Camera,
             };
-            fit(shape, &data, Start { free, heights_m: &[], poses }).unwrap()
+            fit(shape, &data, Start { free, knots_m: &[], poses }).unwrap()
         };
         let whole = fit_of(&views, &shape.start(&FACTORY), &poses);
         for left_out in 0..views.len() {

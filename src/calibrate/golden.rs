@@ -113,7 +113,7 @@ fn same_sigmas_as_mrcal() {
         wanted: Wanted::Everything,
     };
     let free = shape.start(&factory);
-    let found = fit(shape, &data, Start { free: &free, heights_m: &[], poses: &poses }).unwrap();
+    let found = fit(shape, &data, Start { free: &free, knots_m: &[], poses: &poses }).unwrap();
 
     let mut calibration = calibrate(&input, Method::Plain(Model::BrownAspect)).unwrap();
     let n_corners = calibration.n_corners() as f64;

@@ -112,7 +112,7 @@ fn plain(
     let shape = model.shape(input.tables, Surface::Flat).ok_or(Error::NoTables { model })?;
     let references: Vec<&Measured> = views.iter().collect();
     let pictures = views::pictures(&references, input.factory.width);
-    let sheet = Sheet::new(input.board);
+    let sheet = Sheet::flat(input.board);
     let data = Data {
         factory: input.factory,
         views: &references,
@@ -124,7 +124,7 @@ fn plain(
     };
     let poses: Vec<_> = views.iter().map(|v| v.pose).collect();
     let free = shape.start(input.factory);
-    let fit = fit(shape, &data, Start { free: &free, heights_m: &[], poses: &poses });
+    let fit = fit(shape, &data, Start { free: &free, knots_m: &[], poses: &poses });
     let prepared = Prepared {
         views,
         outliers: Vec::new(),
@@ -191,7 +191,7 @@ fn assemble(
     };
     let whole = fit.covariance.as_ref().filter(|_| enough).ok_or_else(undetermined)?;
     let names = shape.names();
-    let n = fit.free.len() + fit.heights_m.len();
+    let n = fit.free.len() + fit.knots_m.len();
     let covariance =
         (0..names.len()).flat_map(|i| whole[i * n..i * n + names.len()].iter().copied()).collect();
     let form = fit.form(&shape);
@@ -199,7 +199,7 @@ fn assemble(
     let mut views = Vec::with_capacity(prepared.views.len());
     let (mut squares, mut n_corners) = (0.0, 0);
     for (view, pose) in prepared.views.iter().zip(&fit.poses) {
-        let numbers = (form.shared.as_slice(), form.heights_m.as_slice());
+        let numbers = (form.shared.as_slice(), form.knots_m.as_slice());
         let points: Vec<Point<Board>> = view
             .corners
             .iter()

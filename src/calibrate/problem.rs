@@ -1,4 +1,10 @@
 //! Reprojection as a bordered least-squares problem: intrinsics shared, one pose per view.
+//!
+//! Eight corners go through the projection and into the normal equations side by side.
+
+use std::borrow::Cow;
+
+use fearless_simd::{Level, Simd, dispatch, f64x8, prelude::*};
 
 use super::{
     model::{Aspect, Center, Shape, Warp, brown},
@@ -9,7 +15,7 @@ use crate::{
     detect::Corner,
     geom::{Board, Color, Pixel, Pose, Vector3},
     pose,
-    solve::{BlockNormal, Bordered, Loss, Row, vectorized},
+    solve::{BlockNormal, Bordered, LANES, Loss, Rows, Sums, sum},
 };
 
 /// One view as the solver sees it.
@@ -33,11 +39,11 @@ pub(super) struct Reprojection<'a, const S: usize> {
     pub(super) sheet: &'a Sheet,
 }
 
-/// A pixel and its derivatives.
-struct Drawn<const S: usize> {
-    pixel: [f64; 2],
-    by_point: [[f64; 3]; 2],
-    by_shared: [[f64; S]; 2],
+/// Eight pixels and their derivatives.
+struct Drawn<I: Simd, const S: usize> {
+    pixel: [f64x8<I>; 2],
+    by_point: [[f64x8<I>; 3]; 2],
+    by_shared: [[f64x8<I>; S]; 2],
 }
 
 /// The camera of one state, ready to project.
@@ -53,8 +59,8 @@ struct Ready<'a> {
 
 enum ReadyLens<'a> {
     None,
-    Table(&'a RadialTable),
-    FreeTable { scaled: RadialTable, whole: &'a RadialTable },
+    /// And the table of which a free share it is, where it is.
+    Table(Cow<'a, RadialTable>, Option<&'a RadialTable>),
     Brown { lens: Brown, first_dip: f64 },
 }
 
@@ -63,9 +69,9 @@ impl<'a, const S: usize> Reprojection<'a, S> {
         let numbers = self.shape.warp_numbers(shared);
         let lens = match self.shape.warp {
             Warp::None => ReadyLens::None,
-            Warp::Table(table) => ReadyLens::Table(table),
+            Warp::Table(table) => ReadyLens::Table(Cow::Borrowed(table), None),
             Warp::FreeTable(whole) => {
-                ReadyLens::FreeTable { scaled: whole.scaled(numbers[0]), whole }
+                ReadyLens::Table(Cow::Owned(whole.scaled(numbers[0])), Some(whole))
             }
             Warp::FreeRadial1 | Warp::FreeRadial2 | Warp::FreeBrown => {
                 let lens = brown(numbers);
@@ -84,51 +90,77 @@ impl<'a, const S: usize> Reprojection<'a, S> {
 }
 
 impl Ready<'_> {
-    /// Where a point of the camera's frame is drawn; `None` behind the camera and outside the lens' domain.
+    /// Where points of the camera's frame are drawn; `None` where one is behind the camera or outside the lens' domain.
     #[inline(always)]
-    fn project<const S: usize>(&self, point: &Vector3<f64>) -> Option<Drawn<S>> {
-        if !(point.z > 0.0) {
+    fn project<I: Simd, const S: usize>(
+        &self,
+        simd: I,
+        [x, y, z]: [f64x8<I>; 3],
+    ) -> Option<Drawn<I, S>> {
+        if !z.simd_gt(0.0).all_true() {
             return None;
         }
         let Intrinsics { fx, fy, cx, cy, .. } = self.pinhole;
-        let inverse_z = 1.0 / point.z;
-        let [u, v] = [point.x * inverse_z, point.y * inverse_z];
-        let mut by_shared = [[0.0; S]; 2];
+        let splat = |number: f64| f64x8::splat(simd, number);
+        let zero = splat(0.0);
+        let inverse_z = splat(1.0) / z;
+        let [u, v] = [x * inverse_z, y * inverse_z];
+        let mut by_shared = [[zero; S]; 2];
         // Derivatives by the ray, and those by focal length and centre.
         let (pixel, [[a, b], [c, d]]) = match &self.lens {
             ReadyLens::None => {
-                self.by_pinhole(&mut by_shared, [u, v], None);
-                ([fx * u + cx, fy * v + cy], [[fx, 0.0], [0.0, fy]])
+                self.by_pinhole(&mut by_shared, [u, v], [[splat(1.0), zero], [zero, splat(1.0)]]);
+                ([u * fx + cx, v * fy + cy], [[splat(fx), zero], [zero, splat(fy)]])
             }
-            ReadyLens::Table(table) => {
-                let straight = Pixel::new(fx * u + cx, fy * v + cy);
-                let (pixel, j) = table.invert_with_jacobian(straight)?;
-                self.by_pinhole(&mut by_shared, [u, v], Some(j));
-                let [[a, b], [c, d]] = j;
-                ([pixel.x, pixel.y], [[a * fx, b * fy], [c * fx, d * fy]])
-            }
-            ReadyLens::FreeTable { scaled, whole } => {
-                let straight = Pixel::new(fx * u + cx, fy * v + cy);
-                let (pixel, j) = scaled.invert_with_jacobian(straight)?;
-                self.by_pinhole(&mut by_shared, [u, v], Some(j));
-                // straight = c + (1 + a·m(r))·(pixel − c) held fixed: J⁻¹·dpixel = −m(r)·(pixel − c)·da.
-                let [[a, b], [c, d]] = j;
-                let [x, y] = pixel - whole.center;
-                let m = whole.magnification_at(x.hypot(y));
-                by_shared[0][3] = -m * (a * x + b * y);
-                by_shared[1][3] = -m * (c * x + d * y);
-                ([pixel.x, pixel.y], [[a * fx, b * fy], [c * fx, d * fy]])
+            ReadyLens::Table(table, whole) => {
+                let [straight_x, straight_y] = [u * fx + cx, v * fy + cy];
+                let (mut pixel, mut j) = ([[0.0; LANES]; 2], [[[0.0; LANES]; 2]; 2]);
+                for lane in 0..LANES {
+                    let straight = Pixel::new(straight_x[lane], straight_y[lane]);
+                    let (bent, [[a, b], [c, d]]) = table.invert_with_jacobian(straight)?;
+                    (pixel[0][lane], pixel[1][lane]) = (bent.x, bent.y);
+                    (j[0][0][lane], j[0][1][lane]) = (a, b);
+                    (j[1][0][lane], j[1][1][lane]) = (c, d);
+                }
+                if let Some(whole) = whole {
+                    // straight = c + (1 + a·m(r))·(pixel − c) held fixed: J⁻¹·dpixel = −m(r)·(pixel − c)·da.
+                    let mut by_amplitude = [[0.0; LANES]; 2];
+                    for lane in 0..LANES {
+                        let [x, y] = Pixel::new(pixel[0][lane], pixel[1][lane]) - whole.center;
+                        let m = whole.magnification_at(x.hypot(y));
+                        for axis in 0..2 {
+                            let [a, b] = j[axis];
+                            by_amplitude[axis][lane] = -m * (a[lane] * x + b[lane] * y);
+                        }
+                    }
+                    for axis in 0..2 {
+                        by_shared[axis][3] = f64x8::simd_from(simd, by_amplitude[axis]);
+                    }
+                }
+                let load = |numbers: [f64; LANES]| f64x8::simd_from(simd, numbers);
+                let [[a, b], [c, d]] = j.map(|row| row.map(load));
+                self.by_pinhole(&mut by_shared, [u, v], [[a, b], [c, d]]);
+                (pixel.map(load), [[a * fx, b * fy], [c * fx, d * fy]])
             }
             ReadyLens::Brown { lens: brown, first_dip } => {
-                let distorted @ [x, y] = brown.distort_before(*first_dip, [u, v])?;
-                self.by_pinhole(&mut by_shared, distorted, None);
-                let [k_x, k_y] = brown.d_distorted_d_parameters([u, v]);
-                for (i, (k_x, k_y)) in k_x.into_iter().zip(k_y).take(self.n_warp).enumerate() {
-                    by_shared[0][3 + i] = fx * k_x;
-                    by_shared[1][3 + i] = fy * k_y;
+                let [[a, b], [c, d]] = brown.by_ray([u, v]);
+                let s = u * u + v * v;
+                // As in `Brown`; NaN is beyond everything.
+                let valid = brown.radial_slope(s).simd_gt(0.0)
+                    & s.simd_le(*first_dip)
+                    & a.simd_gt(0.0)
+                    & (a * d - b * c).simd_gt(0.0);
+                if !valid.all_true() {
+                    return None;
                 }
-                let [[a, b], [c, d]] = brown.d_distorted_d_ray([u, v]);
-                ([fx * x + cx, fy * y + cy], [[fx * a, fx * b], [fy * c, fy * d]])
+                let [x, y] = brown.polynomial([u, v]);
+                self.by_pinhole(&mut by_shared, [x, y], [[splat(1.0), zero], [zero, splat(1.0)]]);
+                let [k_x, k_y] = Brown::by_parameters([u, v]);
+                for i in 0..self.n_warp {
+                    by_shared[0][3 + i] = k_x[i] * fx;
+                    by_shared[1][3 + i] = k_y[i] * fy;
+                }
+                ([x * fx + cx, y * fy + cy], [[a * fx, b * fx], [c * fy, d * fy]])
             }
         };
         let by_point = [
@@ -138,20 +170,19 @@ impl Ready<'_> {
         Some(Drawn { pixel, by_point, by_shared })
     }
 
-    /// Derivatives by focal length and centre of (fx·x + cx, fy·y + cy), followed by a map with Jacobian `after`.
+    /// Derivatives by focal length and centre of (fx·x + cx, fy·y + cy), followed by a map with this Jacobian.
     #[inline(always)]
-    fn by_pinhole<const S: usize>(
+    fn by_pinhole<I: Simd, const S: usize>(
         &self,
-        by_shared: &mut [[f64; S]; 2],
-        [x, y]: [f64; 2],
-        after: Option<[[f64; 2]; 2]>,
+        by_shared: &mut [[f64x8<I>; S]; 2],
+        [x, y]: [f64x8<I>; 2],
+        [[a, b], [c, d]]: [[f64x8<I>; 2]; 2],
     ) {
-        let [[a, b], [c, d]] = after.unwrap_or([[1.0, 0.0], [0.0, 1.0]]);
         if let Some(at) = self.aspect_at {
-            by_shared[0][at] = b * self.pinhole.fx * y;
-            by_shared[1][at] = d * self.pinhole.fx * y;
+            by_shared[0][at] = b * y * self.pinhole.fx;
+            by_shared[1][at] = d * y * self.pinhole.fx;
         }
-        let y = self.aspect * y;
+        let y = y * self.aspect;
         by_shared[0][0] = a * x + b * y;
         by_shared[1][0] = c * x + d * y;
         if self.center == Center::Free {
@@ -163,94 +194,164 @@ impl Ready<'_> {
     }
 }
 
-/// So many residuals go through the normal equations together, an even number.
-const ROWS_AT_ONCE: usize = 8;
-
 /// How far a view may turn (radians) and shift (metres) while the rows of its image are read: a hand leads a camera by
 /// a quarter of a radian and some centimetres a second, and reading takes some ten milliseconds.
 const MOTION_SIGMA: [f64; 6] = [4e-3, 4e-3, 4e-3, 2e-3, 2e-3, 2e-3];
 
+/// A number of each of up to eight items; lanes beyond the last are that one again.
+#[inline(always)]
+fn gather<I: Simd, T>(simd: I, items: &[T], number: impl Fn(&T) -> f64) -> f64x8<I> {
+    let last = items.len() - 1;
+    f64x8::from_fn(
+        simd,
+        #[inline(always)]
+        |lane| number(&items[lane.min(last)]),
+    )
+}
+
+/// What a view's own parameters are.
+trait Own<const B: usize> {
+    /// Derivatives by them, from those by the pose and the time at which the corner's row is read (from −½ at the top
+    /// to ½ at the bottom of the image).
+    fn derivatives<I: Simd>(by_pose: [f64x8<I>; 6], time: f64x8<I>) -> [f64x8<I>; B];
+}
+
+/// A pose.
+struct Still;
+
+/// A pose, and by how much it changes from the first row to the last.
+struct Moving;
+
+impl Own<6> for Still {
+    #[inline(always)]
+    fn derivatives<I: Simd>(by_pose: [f64x8<I>; 6], _: f64x8<I>) -> [f64x8<I>; 6] {
+        by_pose
+    }
+}
+
+impl Own<12> for Moving {
+    #[inline(always)]
+    fn derivatives<I: Simd>(by_pose: [f64x8<I>; 6], time: f64x8<I>) -> [f64x8<I>; 12] {
+        std::array::from_fn(|k| if k < 6 { by_pose[k] } else { time * by_pose[k - 6] })
+    }
+}
+
 impl<const S: usize> Reprojection<'_, S> {
-    /// Adds all residuals of a view; `own` takes the derivatives by the pose, and the time at which the corner's row is
-    /// read (from −½ at the top to ½ at the bottom of the image), to those by the block's parameters.
-    fn add_view<const B: usize>(
+    /// Adds all residuals of a view.
+    fn add_view<O: Own<B>, const B: usize>(
         &self,
         index: usize,
         numbers: (&[f64; S], &[f64]),
         pose: &Pose<Color, Board>,
         normal: &mut BlockNormal<S, B>,
-        own: impl Fn(&[f64; 6], f64) -> [f64; B],
     ) -> bool {
-        vectorized(
-            #[inline(always)]
-            || self.add_corners(index, numbers, pose, normal, own),
-        )
+        let whole = dispatch!(Level::new(), simd => {
+            self.add_corners::<_, O, B>(simd, index, numbers, pose, normal)
+        });
+        if let Some(mixture) = self.sheet.mixture(self.shape.surface) {
+            normal.mix_loose(mixture);
+        }
+        whole
     }
 
     #[inline(always)]
-    fn add_corners<const B: usize>(
+    fn add_corners<I: Simd, O: Own<B>, const B: usize>(
         &self,
+        simd: I,
         index: usize,
-        (shared, heights_m): (&[f64; S], &[f64]),
+        (shared, knots_m): (&[f64; S], &[f64]),
         pose: &Pose<Color, Board>,
         normal: &mut BlockNormal<S, B>,
-        own: impl Fn(&[f64; 6], f64) -> [f64; B],
     ) -> bool {
         if !(shared[0] > 0.0) {
             return false;
         }
         let ready = self.ready(shared);
         let view = self.views[index];
-        let rotation = *pose.rotation.matrix();
-        let normal_axis = rotation.column(2).into_owned();
+        let m = pose.rotation.matrix();
+        let turn = |[x, y, z]: [f64x8<I>; 3]| {
+            [0, 1, 2].map(|r| x * m[(r, 0)] + y * m[(r, 1)] + z * m[(r, 2)])
+        };
         let surface = self.shape.surface;
         let numbers = self.shape.surface_numbers(shared);
         let first = S - numbers.len();
         let per_row = (self.factory.height as f64).recip();
-        if !heights_m.is_empty() {
+        if !knots_m.is_empty() {
             normal.reserve_loose(view.corners.len());
         }
-        let mut rows = [Row::ZERO; ROWS_AT_ONCE];
-        let mut n_rows = 0;
-        for (index, corner) in view.corners.iter().enumerate() {
-            let point = &view.points[index];
-            let place = self.sheet.lifted(surface, (corner.id, point), (numbers, heights_m));
-            let turned = rotation * place.coords;
-            let Some(drawn) = ready.project::<S>(&(turned + pose.translation)) else {
+        let mut sums = Sums::<I, S, B>::zero(simd);
+        let mut cost = f64x8::splat(simd, 0.0);
+        for start in (0..view.corners.len()).step_by(LANES) {
+            let n = (view.corners.len() - start).min(LANES);
+            let points = &view.points[start..start + n];
+            let corners = &view.corners[start..start + n];
+            let x = gather(simd, points, |p| p.x);
+            let y = gather(simd, points, |p| p.y);
+            let mut place = [x, y, gather(simd, points, |p| p.z)];
+            let by_surface = self.sheet.by_shared(surface, [x, y]);
+            for (by, number) in by_surface.iter().zip(numbers) {
+                (0..3).for_each(|k| place[k] += by[k] * *number);
+            }
+            if !knots_m.is_empty() {
+                place[2] += gather(simd, corners, |c| self.sheet.height_m(c.id, knots_m));
+            }
+            let turned = turn(place);
+            let t = &pose.translation;
+            let [tx, ty, tz] = turned;
+            let Some(drawn) = ready.project::<I, S>(simd, [tx + t.x, ty + t.y, tz + t.z]) else {
                 return false;
             };
-            let residual = [corner.pixel.x - drawn.pixel[0], corner.pixel.y - drawn.pixel[1]];
-            let square = view.weights[index] * (residual[0].powi(2) + residual[1].powi(2));
-            let weight = view.weights[index] * self.loss.weight(square);
-            let time = (corner.pixel.y + 0.5) * per_row - 0.5;
-            normal.add_cost(0.5 * self.loss.rho(square));
-            for axis in 0..2 {
-                let by_point = drawn.by_point[axis];
-                let along =
-                    |v: &Vector3<f64>| by_point[0] * v.x + by_point[1] * v.y + by_point[2] * v.z;
-                let row = &mut rows[n_rows];
-                row.weight = weight;
-                row.residual = residual[axis];
-                row.d_shared = drawn.by_shared[axis];
-                if !numbers.is_empty() {
-                    let by_surface = self.sheet.by_shared(surface, point);
-                    for (derivative, by) in row.d_shared[first..].iter_mut().zip(by_surface) {
-                        *derivative = along(&(rotation * by));
-                    }
+            let seen = [gather(simd, corners, |c| c.pixel.x), gather(simd, corners, |c| c.pixel.y)];
+            let weights = &view.weights[start..start + n];
+            let given = f64x8::from_fn(simd, |lane| weights.get(lane).copied().unwrap_or(0.0));
+            let residual = [seen[0] - drawn.pixel[0], seen[1] - drawn.pixel[1]];
+            let square = given * (residual[0] * residual[0] + residual[1] * residual[1]);
+            let weight = match self.loss {
+                Loss::Squared => {
+                    cost += square;
+                    given
                 }
-                row.d_block = own(&pose::d_pixel_d_pose(by_point, &turned), time);
-                if !heights_m.is_empty() {
-                    normal.add_loose(row, (corner.id, along(&normal_axis)));
+                loss => {
+                    cost += f64x8::from_fn(simd, |lane| loss.rho(square[lane]));
+                    given * f64x8::from_fn(simd, |lane| loss.weight(square[lane]))
                 }
-                n_rows += 1;
-            }
-            if n_rows == ROWS_AT_ONCE {
-                normal.add_rows(&rows);
-                n_rows = 0;
+            };
+            let time = (seen[1] + 0.5) * per_row - 0.5;
+            let rows = [0, 1].map(|axis| {
+                let [a, b, c] = drawn.by_point[axis];
+                let mut d_shared = drawn.by_shared[axis];
+                for (derivative, by) in d_shared[first..].iter_mut().zip(by_surface) {
+                    let [x, y, z] = turn(by);
+                    *derivative = a * x + b * y + c * z;
+                }
+                let by_pose = [ty * c - tz * b, tz * a - tx * c, tx * b - ty * a, a, b, c];
+                let d_block = O::derivatives(by_pose, time);
+                Rows { weight, residual: residual[axis], d_shared, d_block }
+            });
+            sums.add(&rows);
+            if !knots_m.is_empty() {
+                let d_loose = drawn
+                    .by_point
+                    .map(|[a, b, c]| a * m[(0, 2)] + b * m[(1, 2)] + c * m[(2, 2)]);
+                let [wa, wb] = d_loose.map(|d| weight * d);
+                let [a, b] = &rows;
+                let by_shared: [f64x8<I>; S] =
+                    std::array::from_fn(|i| wa * a.d_shared[i] + wb * b.d_shared[i]);
+                let by_block: [f64x8<I>; B] =
+                    std::array::from_fn(|i| wa * a.d_block[i] + wb * b.d_block[i]);
+                let by_itself = wa * d_loose[0] + wb * d_loose[1];
+                let right = wa * a.residual + wb * b.residual;
+                for (lane, corner) in corners.iter().enumerate() {
+                    normal.push_loose(
+                        corner.id,
+                        (by_shared.map(|by| by[lane]), by_block.map(|by| by[lane])),
+                        (by_itself[lane], right[lane]),
+                    );
+                }
             }
         }
-        rows[n_rows..].fill(Row::ZERO);
-        normal.add_rows(&rows);
+        sums.add_to(normal);
+        normal.add_cost(0.5 * sum(cost));
         true
     }
 
@@ -263,9 +364,7 @@ impl<const S: usize> Reprojection<'_, S> {
         pose: &Pose<Color, Board>,
     ) -> Option<BlockNormal<S, 12>> {
         let mut normal = BlockNormal::ZERO;
-        let whole = self.add_view(index, numbers, pose, &mut normal, |by_pose, time| {
-            std::array::from_fn(|k| if k < 6 { by_pose[k] } else { time * by_pose[k - 6] })
-        });
+        let whole = self.add_view::<Moving, 12>(index, numbers, pose, &mut normal);
         for (k, sigma) in MOTION_SIGMA.into_iter().enumerate() {
             let mut unit = [0.0; 12];
             unit[6 + k] = 1.0;
@@ -282,11 +381,11 @@ impl<const S: usize> Bordered<S, 6> for Reprojection<'_, S> {
         &self,
         index: usize,
         shared: &[f64; S],
-        heights_m: &[f64],
+        knots_m: &[f64],
         pose: &Self::Block,
         normal: &mut BlockNormal<S, 6>,
     ) -> bool {
-        self.add_view(index, (shared, heights_m), pose, normal, |by_pose, _| *by_pose)
+        self.add_view::<Still, 6>(index, (shared, knots_m), pose, normal)
     }
 
     fn shared_precision(&self) -> [f64; S] {
@@ -296,7 +395,7 @@ impl<const S: usize> Bordered<S, 6> for Reprojection<'_, S> {
     }
 
     fn loose_precision(&self) -> &[f64] {
-        self.sheet.height_precision(self.shape.surface)
+        self.sheet.knot_precision(self.shape.surface)
     }
 
     fn advance_block(&self, pose: &Self::Block, step: &[f64; 6]) -> Self::Block {
@@ -333,6 +432,21 @@ mod tests {
         Shape { center, warp, aspect: Aspect::Fixed, surface: Surface::Flat }
     }
 
+    /// The pixel of one point, its derivatives by the point, and those by the shared numbers.
+    type One<const S: usize> = ([f64; 2], [[f64; 3]; 2], [[f64; S]; 2]);
+
+    fn one<const S: usize>(ready: &Ready<'_>, point: &Vector3<f64>) -> One<S> {
+        dispatch!(Level::new(), simd => {
+            let lanes = [point.x, point.y, point.z].map(|c| f64x8::splat(simd, c));
+            let drawn = ready.project::<_, S>(simd, lanes).unwrap();
+            (
+                drawn.pixel.map(|p| p[7]),
+                drawn.by_point.map(|row| row.map(|d| d[7])),
+                drawn.by_shared.map(|row| row.map(|d| d[7])),
+            )
+        })
+    }
+
     /// Against differences, and against the camera of the same numbers.
     fn check<const S: usize>(factory: &Intrinsics, shape: Shape<'_>, shared: [f64; S]) {
         assert_eq!(shape.names().len(), S);
@@ -345,19 +459,19 @@ mod tests {
             let board =
                 Vector3::new(f64::from(i % 8) * 0.03 - 0.1, f64::from(i / 8) * 0.03 - 0.06, 0.0);
             let point = turn * board + Vector3::new(0.011, 0.007, 0.3);
-            let drawn = problem.ready(&shared).project::<S>(&point).unwrap();
+            let (pixel, by_point, by_shared) = one::<S>(&problem.ready(&shared), &point);
             let expected = camera.project(crate::geom::Point::from_coords(point)).unwrap();
-            assert!((drawn.pixel[0] - expected.x).hypot(drawn.pixel[1] - expected.y) < 1e-10);
+            assert!((pixel[0] - expected.x).hypot(pixel[1] - expected.y) < 1e-10);
             for k in 0..S {
                 let h = 1e-6 * shared[k].abs().max(0.1);
                 let [low, high] = [-h, h].map(|h| {
                     let mut moved = shared;
                     moved[k] += h;
-                    problem.ready(&moved).project::<S>(&point).unwrap().pixel
+                    one::<S>(&problem.ready(&moved), &point).0
                 });
                 for row in 0..2 {
                     let numeric = (high[row] - low[row]) / (2.0 * h);
-                    let analytic = drawn.by_shared[row][k];
+                    let analytic = by_shared[row][k];
                     assert!(
                         (analytic - numeric).abs() < 1e-5 * numeric.abs().max(1.0),
                         "{shape:?} {k} {row}: {analytic} {numeric}"
@@ -369,11 +483,11 @@ mod tests {
                 let [low, high] = [-h, h].map(|h| {
                     let mut moved = point;
                     moved[k] += h;
-                    problem.ready(&shared).project::<S>(&moved).unwrap().pixel
+                    one::<S>(&problem.ready(&shared), &moved).0
                 });
                 for row in 0..2 {
                     let numeric = (high[row] - low[row]) / (2.0 * h);
-                    assert!((drawn.by_point[row][k] - numeric).abs() < 1e-2, "{shape:?} {k} {row}");
+                    assert!((by_point[row][k] - numeric).abs() < 1e-2, "{shape:?} {k} {row}");
                 }
             }
         }

@@ -3,8 +3,9 @@
 use super::{BoardSurface, Estimate, SurfaceKind};
 use crate::{
     board::CharucoBoard,
+    camera::Real,
     geom::{Board, Matrix3, Point, Vector3},
-    solve::DenseCholesky,
+    solve::{DenseCholesky, Mixture},
 };
 
 /// How flat a board is taken to be before anything was seen: the σ of heights as a share of the board's longer side.
@@ -12,15 +13,16 @@ use crate::{
 /// corners say so.
 const SIGMA_SHARE: f64 = 0.005;
 
-/// Over how many squares the height of a free surface is alike beforehand: paper glued onto card ripples with about
-/// twice that from crest to crest.
-const SMOOTH_SQUARES: f64 = 2.0;
+/// Over how many knots the height of a free surface is alike beforehand; each corner of a board of some ten by ten squares
+/// is a knot. Paper glued onto card ripples with about twice that from crest to crest.
+const SMOOTH_KNOTS: f64 = 2.0;
 
 /// How far a print may be stretched and sheared: printers are good to a tenth of a percent.
 const PRINT_SIGMA: f64 = 1e-3;
 
-/// A free surface has a height for each corner; beyond so many its equations would take longer than they are worth.
-const MAX_FREE_CORNERS: usize = 200;
+/// A free surface has a height for each corner of a board with up to so many; on a larger one the corners lie on a surface
+/// through the heights of so many knots. A sheet of paper ripples with its size, not with that of its squares.
+const MAX_KNOTS: usize = 200;
 
 /// What is taken for known of the board's shape.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,12 +52,12 @@ impl Surface {
     }
 }
 
-/// The numbers of a surface: those shared (bend, or stretch and shear), and the heights of all corners, metres (none
+/// The numbers of a surface: those shared (bend, or stretch and shear), and the heights of all knots, metres (none
 /// unless the surface is free).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Form {
     pub(super) shared: Vec<f64>,
-    pub(super) heights_m: Vec<f64>,
+    pub(super) knots_m: Vec<f64>,
 }
 
 /// A board, and what is known of its shape beforehand.
@@ -64,56 +66,92 @@ pub(super) struct Sheet {
     center: [f64; 2],
     half: [f64; 2],
     sigma_m: f64,
-    /// The inverse covariance of the heights, row-major.
+    /// The inverse covariance of the knots' heights, row-major.
     precision: Vec<f64>,
+    /// How the heights of the corners follow from those of the knots; `None` where corners are knots.
+    mixture: Option<Mixture>,
     corners: Vec<Vector3<f64>>,
 }
 
 impl Sheet {
-    /// The heights of a free surface are a Gaussian process beforehand: σ as above, correlation of Matérn's form with
-    /// ν = 3/2 (once differentiable), (1 + d)·exp(−d), d = √3·distance/length.
+    /// The heights of a free surface's knots are a Gaussian process beforehand: σ as above, correlation of Matérn's form
+    /// with ν = 3/2 (once differentiable), (1 + d)·exp(−d), d = √3·distance/length. Between knots the surface is that of
+    /// cubic convolution (Keys 1981).
     pub(super) fn new(board: &CharucoBoard) -> Self {
-        let half = [board.squares_x, board.squares_y].map(|n| 0.5 * n as f64 * board.square_m);
-        let sigma_m = SIGMA_SHARE * 2.0 * half[0].max(half[1]);
-        let n = board.n_corners();
-        let corners: Vec<Vector3<f64>> = (0..n).map(|id| board.corner(id).coords).collect();
-        let mut sheet = Self { center: half, half, sigma_m, precision: Vec::new(), corners };
-        if n <= MAX_FREE_CORNERS {
-            let corners = &sheet.corners;
-            let scale = 3.0_f64.sqrt() / (SMOOTH_SQUARES * board.square_m);
-            let covariance = (0..n * n)
-                .map(|at| {
-                    let d = scale * (corners[at / n] - corners[at % n]).norm();
-                    sigma_m * sigma_m * (1.0 + d) * (-d).exp()
-                })
-                .collect();
-            if let Some(factor) = DenseCholesky::new(covariance, n) {
-                sheet.precision = factor.inverse();
-            }
-        }
-        sheet
+        let flat = Self::flat(board);
+        let n_corners = board.n_corners();
+        let corners: Vec<Vector3<f64>> = (0..n_corners).map(|id| board.corner(id).coords).collect();
+        let [columns, rows] = [board.squares_x, board.squares_y].map(|n| n - 1);
+        let (mixture, knots, pitch_m) = if n_corners <= MAX_KNOTS {
+            (None, corners.clone(), board.square_m)
+        } else {
+            let [across, down] = knots_along([columns, rows]);
+            let [dx, dy] = [across.pitch(), down.pitch()].map(|pitch| pitch * board.square_m);
+            let knots = (0..across.n_knots * down.n_knots).map(|at| {
+                let (i, j) = (at % across.n_knots, at / across.n_knots);
+                corners[0] + Vector3::new(i as f64 * dx, j as f64 * dy, 0.0)
+            });
+            let shares = (0..n_corners).map(|id| {
+                let (column, row) = board.corner_cell(id);
+                let by_row = down.shares(row);
+                let of_row = |(j, b): (usize, f64)| {
+                    across.shares(column).into_iter().map(move |(i, a)| (i, j, a * b))
+                };
+                let shares = by_row.into_iter().flat_map(of_row);
+                shares.map(|(i, j, share)| (j * across.n_knots + i, share)).collect()
+            });
+            let n_parameters = across.n_knots * down.n_knots;
+            let mixture = Mixture { shares: shares.collect(), n_parameters };
+            (Some(mixture), knots.collect(), (dx * dy).sqrt())
+        };
+        let n = knots.len();
+        let scale = 3.0_f64.sqrt() / (SMOOTH_KNOTS * pitch_m);
+        let covariance = (0..n * n)
+            .map(|at| {
+                let d = scale * (knots[at / n] - knots[at % n]).norm();
+                flat.sigma_m * flat.sigma_m * (1.0 + d) * (-d).exp()
+            })
+            .collect();
+        let precision = DenseCholesky::new(covariance, n).map(|factor| factor.inverse());
+        Self { precision: precision.unwrap_or_default(), mixture, corners, ..flat }
     }
 
     /// A board of which no free surface is asked.
     pub(super) fn flat(board: &CharucoBoard) -> Self {
         let half = [board.squares_x, board.squares_y].map(|n| 0.5 * n as f64 * board.square_m);
         let sigma_m = SIGMA_SHARE * 2.0 * half[0].max(half[1]);
-        Self { center: half, half, sigma_m, precision: Vec::new(), corners: Vec::new() }
+        let (precision, mixture, corners) = (Vec::new(), None, Vec::new());
+        Self { center: half, half, sigma_m, precision, mixture, corners }
     }
 
-    /// Is the board small enough for this surface?
+    /// Was it made for this surface?
     pub(super) fn allows(&self, surface: Surface) -> bool {
         surface != Surface::Free || !self.precision.is_empty()
     }
 
-    /// The inverse covariance of the heights beforehand; empty where the surface has none.
-    pub(super) fn height_precision(&self, surface: Surface) -> &[f64] {
+    /// The inverse covariance of the knots' heights beforehand; empty where the surface has none.
+    pub(super) fn knot_precision(&self, surface: Surface) -> &[f64] {
         if surface == Surface::Free { &self.precision } else { &[] }
     }
 
     /// How many heights are free.
-    pub(super) fn n_heights(&self, surface: Surface) -> usize {
-        if surface == Surface::Free { self.corners.len() } else { 0 }
+    pub(super) fn n_knots(&self, surface: Surface) -> usize {
+        if surface == Surface::Free { self.precision.len().isqrt() } else { 0 }
+    }
+
+    /// How the heights of the corners follow from those of the knots, where they are not the same.
+    pub(super) fn mixture(&self, surface: Surface) -> Option<&Mixture> {
+        self.mixture.as_ref().filter(|_| surface == Surface::Free)
+    }
+
+    /// The height of a corner of a free surface, metres; of any other there are no knots, and it is zero.
+    #[inline]
+    pub(super) fn height_m(&self, id: usize, knots_m: &[f64]) -> f64 {
+        match &self.mixture {
+            None => knots_m.get(id).copied().unwrap_or(0.0),
+            Some(_) if knots_m.is_empty() => 0.0,
+            Some(mixture) => mixture.shares[id].iter().map(|(k, share)| share * knots_m[*k]).sum(),
+        }
     }
 
     /// The precision (1/σ²) of each of the shared numbers beforehand.
@@ -125,17 +163,19 @@ impl Sheet {
         }
     }
 
-    /// How a corner moves with each of the shared numbers.
-    #[inline]
-    pub(super) fn by_shared(&self, surface: Surface, point: &Vector3<f64>) -> [Vector3<f64>; 2] {
-        let [x, y] = [point.x - self.center[0], point.y - self.center[1]];
+    /// How a corner at (x, y) of the board moves with each of the shared numbers.
+    #[inline(always)]
+    pub(super) fn by_shared<T: Real>(&self, surface: Surface, [x, y]: [T; 2]) -> [[T; 3]; 2] {
+        let [x, y] = [x + -self.center[0], y + -self.center[1]];
+        let zero = x * 0.0;
         match surface {
-            Surface::Flat => [Vector3::zeros(); 2],
+            Surface::Flat => [[zero; 3]; 2],
             // As mrcal's `calobject_warp`.
             Surface::Bend => {
-                [x / self.half[0], y / self.half[1]].map(|s| Vector3::new(0.0, 0.0, 1.0 - s * s))
+                let [x, y] = [x * self.half[0].recip(), y * self.half[1].recip()];
+                [[zero, zero, x * x * -1.0 + 1.0], [zero, zero, y * y * -1.0 + 1.0]]
             }
-            Surface::Free => [Vector3::new(x, -y, 0.0), Vector3::new(y, x, 0.0)],
+            Surface::Free => [[x, y * -1.0, zero], [y, x, zero]],
         }
     }
 
@@ -145,34 +185,46 @@ impl Sheet {
         &self,
         surface: Surface,
         (id, point): (usize, &Vector3<f64>),
-        (shared, heights_m): (&[f64], &[f64]),
+        (shared, knots_m): (&[f64], &[f64]),
     ) -> Point<Board> {
         let mut place = *point;
-        for (by, number) in self.by_shared(surface, point).iter().zip(shared) {
-            place += by * *number;
+        for (by, number) in self.by_shared(surface, [point.x, point.y]).into_iter().zip(shared) {
+            place += Vector3::from(by) * *number;
         }
-        if let Some(height) = heights_m.get(id) {
-            place.z += height;
-        }
+        place.z += self.height_m(id, knots_m);
         Point::from_coords(place)
     }
 
     /// The height of all corners by each of the surface's numbers.
-    fn by_numbers(&self, surface: Surface) -> impl Iterator<Item = Vec<f64>> {
-        let shared = (0..surface.n_shared()).map(move |k| {
-            self.corners.iter().map(|corner| self.by_shared(surface, corner)[k].z).collect()
-        });
-        let heights = (0..self.n_heights(surface))
-            .map(|k| (0..self.corners.len()).map(|id| f64::from(u8::from(k == id))).collect());
-        shared.chain(heights)
+    fn by_numbers(&self, surface: Surface) -> Vec<Vec<f64>> {
+        let mut columns: Vec<Vec<f64>> = (0..surface.n_shared())
+            .map(|k| {
+                let by = |corner: &Vector3<f64>| self.by_shared(surface, [corner.x, corner.y])[k];
+                self.corners.iter().map(|corner| by(corner)[2]).collect()
+            })
+            .collect();
+        let first = columns.len();
+        columns.resize(first + self.n_knots(surface), vec![0.0; self.corners.len()]);
+        for id in 0..if surface == Surface::Free { self.corners.len() } else { 0 } {
+            match &self.mixture {
+                None => columns[first + id][id] = 1.0,
+                Some(mixture) => {
+                    for &(knot, share) in &mixture.shares[id] {
+                        columns[first + knot][id] = share;
+                    }
+                }
+            }
+        }
+        columns
     }
 
     /// How the board's own plane (the best one through its corners) moves with each of the surface's numbers, as a step
     /// (ω, τ) of a pose in the board's frame: radians, metres.
     pub(super) fn plane_steps(&self, surface: Surface) -> Vec<[f64; 6]> {
         self.by_numbers(surface)
+            .iter()
             .map(|column| {
-                let plane = best_plane(&self.corners, &column);
+                let plane = best_plane(&self.corners, column);
                 [plane.z, -plane.y, 0.0, 0.0, 0.0, plane.x]
             })
             .collect()
@@ -193,6 +245,7 @@ impl Sheet {
         // The height of each corner by each number of the surface, the best plane taken out: the poses have it.
         let columns: Vec<Vec<f64>> = self
             .by_numbers(surface)
+            .into_iter()
             .map(|column| {
                 let plane = best_plane(corners, &column);
                 let flat = |p: &Vector3<f64>| plane.x + plane.y * p.x + plane.z * p.y;
@@ -202,16 +255,16 @@ impl Sheet {
         let n_numbers = columns.len();
         let n = covariance.len().isqrt();
         let first = n - n_numbers;
-        let numbers: Vec<f64> = form.shared.iter().chain(&form.heights_m).copied().collect();
+        let numbers: Vec<f64> = form.shared.iter().chain(&form.knots_m).copied().collect();
         let mut heights_m = Vec::with_capacity(corners.len());
         let mut sigmas_m = Vec::with_capacity(corners.len());
         for id in 0..corners.len() {
             heights_m.push(numbers.iter().zip(&columns).map(|(c, column)| c * column[id]).sum());
+            let by: Vec<f64> = columns.iter().map(|column| column[id]).collect();
             let mut variance = 0.0;
-            for (i, a) in columns.iter().enumerate() {
-                for (j, b) in columns.iter().enumerate() {
-                    variance += a[id] * covariance[(first + i) * n + first + j] * b[id];
-                }
+            for (i, a) in by.iter().enumerate() {
+                let row = &covariance[(first + i) * n + first..][..by.len()];
+                variance += a * row.iter().zip(&by).map(|(c, b)| c * b).sum::<f64>();
             }
             sigmas_m.push(variance.max(0.0).sqrt());
         }
@@ -222,6 +275,64 @@ impl Sheet {
             })
         });
         Some(BoardSurface { kind: surface.kind(), heights_m, sigmas_m, print })
+    }
+}
+
+/// Knots along one side of a board, spread evenly from its first corner to its last.
+#[derive(Clone, Copy, Debug)]
+struct Along {
+    n_corners: usize,
+    n_knots: usize,
+}
+
+/// As many knots as there may be, alike apart along both sides as far as their numbers allow: at least four along each.
+fn knots_along(n_corners: [usize; 2]) -> [Along; 2] {
+    let spread = |pitch: f64| {
+        n_corners.map(|n_corners| {
+            let n_knots = ((n_corners - 1) as f64 / pitch) as usize + 1;
+            Along { n_corners, n_knots: n_knots.max(n_corners.min(4)) }
+        })
+    };
+    let mut pitch = 1.0;
+    while spread(pitch).iter().map(|along| along.n_knots).product::<usize>() > MAX_KNOTS {
+        pitch *= 1.01;
+    }
+    spread(pitch)
+}
+
+impl Along {
+    /// From knot to knot, in squares.
+    fn pitch(self) -> f64 {
+        (self.n_corners - 1) as f64 / (self.n_knots - 1) as f64
+    }
+
+    /// The knots that the height of a corner follows from, and how much each of them: Keys' cubic convolution with a =
+    /// −½, beyond the border the straight line through the last two.
+    fn shares(self, corner: usize) -> Vec<(usize, f64)> {
+        let at = corner as f64 / self.pitch();
+        let inside = (at.floor() as usize).min(self.n_knots - 2);
+        let t = at - inside as f64;
+        let kernel = [
+            ((-0.5 * t + 1.0) * t - 0.5) * t,
+            (1.5 * t - 2.5) * t * t + 1.0,
+            ((-1.5 * t + 2.0) * t + 0.5) * t,
+            (0.5 * t - 0.5) * t * t,
+        ];
+        let mut shares = vec![0.0; self.n_knots];
+        for (k, share) in kernel.into_iter().enumerate() {
+            match inside + k {
+                0 => {
+                    shares[0] += 2.0 * share;
+                    shares[1] -= share;
+                }
+                beyond if beyond > self.n_knots => {
+                    shares[self.n_knots - 1] += 2.0 * share;
+                    shares[self.n_knots - 2] -= share;
+                }
+                knot => shares[knot - 1] += share,
+            }
+        }
+        shares.into_iter().enumerate().filter(|(_, share)| share.abs() > 1e-12).collect()
     }
 }
 

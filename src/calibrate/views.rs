@@ -165,12 +165,14 @@ pub(super) fn pictures(views: &[&Measured], width_px: usize) -> Vec<usize> {
             .then(ka.0.total_cmp(&kb.0))
             .then(ka.1.total_cmp(&kb.1))
     });
+    let middles: Vec<_> = views.iter().map(|view| Middle::of(view)).collect();
     let mut leaders: Vec<usize> = Vec::new();
     let mut picture = vec![0; views.len()];
     for index in order {
         let nearest = leaders
             .iter()
             .enumerate()
+            .filter(|(_, leader)| !middles[**leader].is_far_from(&middles[index], near_px))
             .filter_map(|(number, &leader)| {
                 Some((distance_px(views[leader], views[index], near_px)?, number))
             })
@@ -184,6 +186,32 @@ pub(super) fn pictures(views: &[&Measured], width_px: usize) -> Vec<usize> {
         };
     }
     picture
+}
+
+/// The middle of a view's corners, where these have ids without gaps.
+struct Middle {
+    ids: Option<(usize, usize)>,
+    pixel: [f64; 2],
+}
+
+impl Middle {
+    fn of(view: &Measured) -> Self {
+        let n = view.corners.len();
+        let ids = match view.corners.as_slice() {
+            [first, .., last] if last.id - first.id == n - 1 => Some((first.id, last.id)),
+            _ => None,
+        };
+        let mean = |of: fn(&Corner) -> f64| view.corners.iter().map(of).sum::<f64>() / n as f64;
+        Self { ids, pixel: [mean(|c| c.pixel.x), mean(|c| c.pixel.y)] }
+    }
+
+    /// Certainly? The mean distance of the same corners is no less than the distance of their middles.
+    fn is_far_from(&self, other: &Self, near_px: f64) -> bool {
+        let [x, y] = [0, 1].map(|k| self.pixel[k] - other.pixel[k]);
+        self.ids.is_some()
+            && self.ids == other.ids
+            && x * x + y * y > near_px * near_px * (1.0 + 1e-9)
+    }
 }
 
 /// The mean distance of common corners, by ids in ascending order; `None` where there are fewer than four, and where it

@@ -1,5 +1,28 @@
 //! Brown-Conrady distortion.
 
+use std::ops::{Add, Mul, Sub};
+
+/// A number, or several side by side.
+pub(crate) trait Real:
+    Copy
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Add<f64, Output = Self>
+    + Mul<f64, Output = Self>
+{
+}
+
+impl<T> Real for T where
+    T: Copy
+        + Add<Output = T>
+        + Sub<Output = T>
+        + Mul<Output = T>
+        + Add<f64, Output = T>
+        + Mul<f64, Output = T>
+{
+}
+
 /// The polynomials of Brown and Conrady, in OpenCV's order and notation.
 ///
 /// With (x, y) the direction (x/z, y/z) and r² = x² + y²:
@@ -100,27 +123,47 @@ impl Brown {
     /// Partial derivatives of the distorted direction (rows x', y') by the direction (columns x, y). Meaningful in
     /// the valid domain.
     #[inline(always)]
-    pub fn d_distorted_d_ray(&self, [x, y]: [f64; 2]) -> [[f64; 2]; 2] {
+    pub fn d_distorted_d_ray(&self, ray: [f64; 2]) -> [[f64; 2]; 2] {
+        self.by_ray(ray)
+    }
+
+    /// As [`d_distorted_d_ray`](Self::d_distorted_d_ray).
+    #[inline(always)]
+    pub(crate) fn by_ray<T: Real>(&self, [x, y]: [T; 2]) -> [[T; 2]; 2] {
         let r2 = x * x + y * y;
-        let radial = 1.0 + r2 * (self.k1 + r2 * (self.k2 + r2 * self.k3));
+        let radial = self.radial(r2);
         // d radial / d r²
-        let slope = self.k1 + r2 * (2.0 * self.k2 + r2 * 3.0 * self.k3);
-        let cross = 2.0 * x * y * slope + 2.0 * self.p1 * x + 2.0 * self.p2 * y;
+        let slope = r2 * (r2 * (3.0 * self.k3) + 2.0 * self.k2) + self.k1;
+        let (x2, y2) = (x * 2.0, y * 2.0);
+        let cross = x2 * y * slope + x2 * self.p1 + y2 * self.p2;
         [
-            [radial + 2.0 * x * x * slope + 2.0 * self.p1 * y + 6.0 * self.p2 * x, cross],
-            [cross, radial + 2.0 * y * y * slope + 6.0 * self.p1 * y + 2.0 * self.p2 * x],
+            [radial + x2 * x * slope + y2 * self.p1 + x * (6.0 * self.p2), cross],
+            [cross, radial + y2 * y * slope + y * (6.0 * self.p1) + x2 * self.p2],
         ]
     }
 
     /// Partial derivatives of the distorted direction (rows x', y') by k1 k2 p1 p2 k3 (columns).
     #[inline(always)]
-    pub fn d_distorted_d_parameters(&self, [x, y]: [f64; 2]) -> [[f64; 5]; 2] {
+    pub fn d_distorted_d_parameters(&self, ray: [f64; 2]) -> [[f64; 5]; 2] {
+        Self::by_parameters(ray)
+    }
+
+    /// As [`d_distorted_d_parameters`](Self::d_distorted_d_parameters).
+    #[inline(always)]
+    pub(crate) fn by_parameters<T: Real>([x, y]: [T; 2]) -> [[T; 5]; 2] {
         let r2 = x * x + y * y;
         let (r4, r6) = (r2 * r2, r2 * r2 * r2);
+        let cross = x * y * 2.0;
         [
-            [x * r2, x * r4, 2.0 * x * y, r2 + 2.0 * x * x, x * r6],
-            [y * r2, y * r4, r2 + 2.0 * y * y, 2.0 * x * y, y * r6],
+            [x * r2, x * r4, cross, r2 + x * x * 2.0, x * r6],
+            [y * r2, y * r4, r2 + y * y * 2.0, cross, y * r6],
         ]
+    }
+
+    /// 1 + k1·r² + k2·r⁴ + k3·r⁶
+    #[inline(always)]
+    fn radial<T: Real>(&self, r2: T) -> T {
+        r2 * (r2 * (r2 * self.k3 + self.k2) + self.k1) + 1.0
     }
 
     /// The radius |(x/z, y/z)| where the radial map first stops increasing; infinite where it never does.
@@ -165,8 +208,8 @@ impl Brown {
 
     /// d(r·radial)/dr at s = r².
     #[inline(always)]
-    fn radial_slope(&self, s: f64) -> f64 {
-        1.0 + s * (3.0 * self.k1 + s * (5.0 * self.k2 + s * 7.0 * self.k3))
+    pub(crate) fn radial_slope<T: Real>(&self, s: T) -> T {
+        s * (s * (s * (7.0 * self.k3) + 5.0 * self.k2) + 3.0 * self.k1) + 1.0
     }
 
     /// In the valid domain, the first dip being known?
@@ -181,19 +224,15 @@ impl Brown {
         a > 0.0 && a * d - b * c > 0.0
     }
 
-    /// As [`distort`](Self::distort) for many directions, [`first_dip`](Self::first_dip) being known.
+    /// Where the lens draws this direction, in the valid domain.
     #[inline(always)]
-    pub(crate) fn distort_before(&self, first_dip: f64, ray: [f64; 2]) -> Option<[f64; 2]> {
-        self.is_valid_before(first_dip, ray).then(|| self.polynomial(ray))
-    }
-
-    #[inline(always)]
-    fn polynomial(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        let r2 = x * x + y * y;
-        let radial = 1.0 + r2 * (self.k1 + r2 * (self.k2 + r2 * self.k3));
+    pub(crate) fn polynomial<T: Real>(&self, [x, y]: [T; 2]) -> [T; 2] {
+        let (xx, yy, cross) = (x * x, y * y, x * y * 2.0);
+        let r2 = xx + yy;
+        let radial = self.radial(r2);
         [
-            x * radial + 2.0 * self.p1 * x * y + self.p2 * (r2 + 2.0 * x * x),
-            y * radial + self.p1 * (r2 + 2.0 * y * y) + 2.0 * self.p2 * x * y,
+            x * radial + cross * self.p1 + (r2 + xx * 2.0) * self.p2,
+            y * radial + (r2 + yy * 2.0) * self.p1 + cross * self.p2,
         ]
     }
 

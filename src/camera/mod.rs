@@ -23,6 +23,7 @@ mod intrinsics;
 mod radial_table;
 
 pub use brown::Brown;
+pub(crate) use brown::Real;
 pub use intrinsics::Intrinsics;
 pub use radial_table::{RadialTable, TablePair};
 

@@ -2,7 +2,10 @@
 
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, SMatrix, SVector, Vector2, Vector3};
 
-use crate::geom::{Board, Color, Homography, Pixel, Point, Pose, Rotation};
+use crate::{
+    geom::{Board, Color, Pixel, Point, Pose, Rotation},
+    solve::Cholesky,
+};
 
 /// A second pose whose sum of squares is that many times the first's is not refined: both are within a few percent of
 /// their minimum.
@@ -28,9 +31,7 @@ pub(super) fn both_poses(
     let n = points.len() as f64;
     let (cx, cy) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.x() / n, y + p.y() / n));
     let from: Vec<Pixel> = points.iter().map(|p| Pixel::new(p.x() - cx, p.y() - cy)).collect();
-    let to: Vec<Pixel> = rays.iter().map(|r| Pixel::new(r[0], r[1])).collect();
-    let h = Homography::from_points(&from, &to)?.matrix;
-    let h = h / h[(2, 2)];
+    let h = homography(&from, rays)?;
     let v = Vector2::new(h[(0, 2)], h[(1, 2)]);
     let j = Matrix2::new(
         h[(0, 0)] - h[(2, 0)] * v.x,
@@ -79,6 +80,57 @@ pub(super) fn both_poses(
         [Some((_, first)), _] => Some(vec![first]),
         _ => None,
     }
+}
+
+/// The homography from points about their centroid to their directions, with 1 for its last element (the centroid is in
+/// front of the camera): the least squares of the equations multiplied out. `None` for fewer than four points and for
+/// points on a line.
+fn homography(from: &[Pixel], rays: &[[f64; 2]]) -> Option<Matrix3<f64>> {
+    let n = from.len() as f64;
+    let square = from.iter().map(|p| p.x * p.x + p.y * p.y).sum::<f64>() / n;
+    if from.len() < 4 || !(square > 0.0) {
+        return None;
+    }
+    let scale = square.sqrt().recip();
+    // Sums of P = p·pᵀ, u·P, v·P and (u² + v²)·P for p = (x, y, 1), each by its six different elements.
+    let mut sums = [[0.0; 6]; 4];
+    for (p, &[u, v]) in from.iter().zip(rays) {
+        let (x, y) = (scale * p.x, scale * p.y);
+        let products = [x * x, x * y, y * y, x, y, 1.0];
+        for (sum, by) in sums.iter_mut().zip([1.0, u, v, u * u + v * v]) {
+            (0..6).for_each(|k| sum[k] += by * products[k]);
+        }
+    }
+    let [plain, by_u, by_v, by_both] = sums;
+    // Two rows of the homography, then two elements of the third; the lower triangle.
+    let mut normal = [[0.0; 8]; 8];
+    let mut right = [0.0; 8];
+    const AT: [[usize; 3]; 3] = [[0, 1, 3], [1, 2, 4], [3, 4, 5]];
+    for i in 0..3 {
+        for j in 0..3 {
+            normal[i][j] = plain[AT[i][j]];
+            normal[3 + i][3 + j] = plain[AT[i][j]];
+        }
+        for j in 0..2 {
+            normal[6 + j][i] = -by_u[AT[i][j]];
+            normal[6 + j][3 + i] = -by_v[AT[i][j]];
+        }
+        (right[i], right[3 + i]) = (by_u[AT[i][2]], by_v[AT[i][2]]);
+    }
+    for i in 0..2 {
+        for j in 0..2 {
+            normal[6 + i][6 + j] = by_both[AT[i][j]];
+        }
+        right[6 + i] = -by_both[AT[i][2]];
+    }
+    // A hundred roundings: points on a line leave that much of the second column.
+    let [xx, xy, yy, ..] = plain;
+    if !(xx * yy - xy * xy > 1e-12 * (xx + yy) * (xx + yy)) {
+        return None;
+    }
+    let h = Cholesky::new(&normal)?.solve(&right);
+    let [a, b, c, d, e, f, g, h] = h;
+    Some(Matrix3::new(a * scale, b * scale, c, d * scale, e * scale, f, g * scale, h * scale, 1.0))
 }
 
 /// The nearest rotation, by Gram and Schmidt (the input is one but for rounding and the noise of b).

@@ -37,7 +37,8 @@ pub struct Solution<S> {
 pub struct Effort {
     /// At most so many linearisations.
     pub max_iterations: usize,
-    /// Done when the linear model promises a smaller relative fall of the cost than this.
+    /// Done when the step after the next would make the cost fall by less than this share of it: by what the linear
+    /// model promises of the next, times how much smaller promises have become from one step to the next.
     pub cost_tolerance: f64,
 }
 
@@ -53,7 +54,7 @@ impl Default for Effort {
 pub struct Minimum<S, N> {
     /// The state.
     pub state: S,
-    /// The normal equations there, to within the last step, which the tolerance did not ask for.
+    /// The normal equations there, to within the last step, which gains a share of 1e4 tolerances of the cost at most.
     pub normal: N,
     /// Half the (robust) sum of squares before that last step.
     pub cost: f64,
@@ -62,6 +63,9 @@ pub struct Minimum<S, N> {
     /// False where the iterations ran out first.
     pub converged: bool,
 }
+
+/// The last step may gain so many tolerances: it is taken, but what it leads to is not looked at.
+const LAST_STEP: f64 = 1e4;
 
 /// A step damped by less is the undamped one for what any camera can know.
 const SLIGHT_DAMPING: f64 = 1e-10;
@@ -83,6 +87,8 @@ pub fn minimize<P: LeastSquares>(
     }
     let mut damping = 1e-4;
     let mut growth = 2.0;
+    // What the step before promised.
+    let mut promised = 0.0;
     let mut n_iterations = 1;
     let mut converged = false;
     while n_iterations < effort.max_iterations {
@@ -95,7 +101,10 @@ pub fn minimize<P: LeastSquares>(
             }
             continue;
         };
-        if !(predicted_decrease > effort.cost_tolerance * cost) {
+        let tolerance = effort.cost_tolerance * cost;
+        let shrinking = predicted_decrease < promised;
+        let left = predicted_decrease * if shrinking { predicted_decrease / promised } else { 1.0 };
+        if !(left > tolerance) && !(predicted_decrease > LAST_STEP * tolerance) {
             // Damping makes small promises where little is known: only nearly undamped ones count.
             if damping > SLIGHT_DAMPING {
                 damping = SLIGHT_DAMPING;
@@ -119,6 +128,7 @@ pub fn minimize<P: LeastSquares>(
             Some((next_normal, next_cost)) => {
                 let gain = (cost - next_cost) / predicted_decrease;
                 (state, normal, cost) = (next, next_normal, next_cost);
+                promised = predicted_decrease;
                 damping *= (1.0 - (2.0 * gain - 1.0).powi(3)).clamp(1e-3, 2.0);
                 growth = 2.0;
             }

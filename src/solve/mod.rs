@@ -55,12 +55,15 @@ mod lm;
 
 mod schur;
 
+mod lanes;
+
 mod covariance;
 
 pub use cholesky::{Cholesky, DenseCholesky};
 pub use covariance::{LeftOut, Pooled, larger, total};
 pub use lm::{Effort, LeastSquares, Minimum, Solution, minimize};
+pub(crate) use lanes::{LANES, Rows, Sums, sum};
 pub use loss::Loss;
-pub use schur::{Arrow, ArrowNormal, BlockNormal, Bordered, BySchur, Reduced, Response, Row};
+pub use schur::{Arrow, ArrowNormal, BlockNormal, Bordered, BySchur, Mixture, Reduced, Response, Row};
 pub(crate) use simd::vectorized;
 pub use stats::{mad_sigma, mean, median, quantile, rms, standard_deviation, standard_error};

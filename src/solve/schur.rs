@@ -8,7 +8,8 @@
 use super::{Cholesky, DenseCholesky, LeastSquares, Solution, simd::vectorized};
 
 /// A least-squares problem of `S` shared parameters, any number of *loose* ones, and any number of blocks of `B`
-/// parameters each: a residual depends on the shared parameters, on one block, and on one loose parameter at most.
+/// parameters each: a residual depends on the shared parameters, on one block, and on one loose parameter at most (or on
+/// a [`Mixture`] of several).
 /// Bundle adjustment of intrinsics (shared), heights of a board's corners (loose) and poses (blocks) is one.
 ///
 /// Its normal equations have the shape of an arrow; the blocks are eliminated one by one (Schur complement), so that
@@ -52,22 +53,25 @@ pub trait Bordered<const S: usize, const B: usize> {
 #[derive(Clone, Debug)]
 pub struct BlockNormal<const S: usize, const B: usize> {
     /// U: shared by shared.
-    u: [[f64; S]; S],
+    pub(super) u: [[f64; S]; S],
     /// W: shared by block.
-    w: [[f64; B]; S],
+    pub(super) w: [[f64; B]; S],
     /// V: block by block.
-    v: [[f64; B]; B],
+    pub(super) v: [[f64; B]; B],
     /// g: right-hand side of the shared parameters.
-    g: [f64; S],
+    pub(super) g: [f64; S],
     /// h: right-hand side of the block's parameters.
-    h: [f64; B],
+    pub(super) h: [f64; B],
     /// The rows of the loose parameters that this block has to do with.
     loose: Vec<Loose<S, B>>,
+    /// Loose by loose parameters beside the diagonal: row-major, of all of them; empty where there is nothing.
+    between: Vec<f64>,
     /// Half the (robust) sum of squares.
     cost: f64,
 }
 
-/// The rows of one loose parameter. Loose parameters never share a residual, so that U is diagonal among them.
+/// The rows of one loose parameter. Before they are mixed loose parameters never share a residual, so that U is diagonal
+/// among them.
 #[derive(Clone, Debug)]
 struct Loose<const S: usize, const B: usize> {
     parameter: usize,
@@ -75,6 +79,16 @@ struct Loose<const S: usize, const B: usize> {
     by_itself: f64,
     by_block: [f64; B],
     right: f64,
+}
+
+/// How numbers of which a residual depends on one at most are made of loose parameters: heights of many corners of those
+/// of few knots.
+#[derive(Clone, Debug)]
+pub struct Mixture {
+    /// For each number the loose parameters and their shares in it; none twice.
+    pub shares: Vec<Vec<(usize, f64)>>,
+    /// How many loose parameters there are.
+    pub n_parameters: usize,
 }
 
 /// A residual (observed − predicted), its weight in the sum of squares, and the derivatives of the *prediction*.
@@ -105,6 +119,7 @@ impl<const S: usize, const B: usize> BlockNormal<S, B> {
         g: [0.0; S],
         h: [0.0; B],
         loose: Vec::new(),
+        between: Vec::new(),
         cost: 0.0,
     };
 
@@ -180,6 +195,48 @@ impl<const S: usize, const B: usize> BlockNormal<S, B> {
         loose.right += weighted * row.residual;
     }
 
+    /// As [`add_loose`](Self::add_loose), with all its sums at once: of one parameter by the shared ones, by those of
+    /// the block, by itself, and its right-hand side.
+    #[inline(always)]
+    pub(crate) fn push_loose(
+        &mut self,
+        parameter: usize,
+        (by_shared, by_block): ([f64; S], [f64; B]),
+        (by_itself, right): (f64, f64),
+    ) {
+        self.loose.push(Loose { parameter, by_shared, by_itself, by_block, right });
+    }
+
+    /// Takes the loose parameters so far for mixtures of others.
+    pub fn mix_loose(&mut self, mixture: &Mixture) {
+        let n = mixture.n_parameters;
+        let zero = |parameter| Loose {
+            parameter,
+            by_shared: [0.0; S],
+            by_itself: 0.0,
+            by_block: [0.0; B],
+            right: 0.0,
+        };
+        let mut mixed: Vec<Loose<S, B>> = (0..n).map(zero).collect();
+        let mut between = vec![0.0; n * n];
+        for loose in &self.loose {
+            let shares = &mixture.shares[loose.parameter];
+            for (at, &(a, share)) in shares.iter().enumerate() {
+                let into = &mut mixed[a];
+                (0..S).for_each(|i| into.by_shared[i] += share * loose.by_shared[i]);
+                (0..B).for_each(|i| into.by_block[i] += share * loose.by_block[i]);
+                into.right += share * loose.right;
+                into.by_itself += share * share * loose.by_itself;
+                let weighted = share * loose.by_itself;
+                for &(b, other) in &shares[..at] {
+                    between[a.max(b) * n + a.min(b)] += weighted * other;
+                }
+            }
+        }
+        mixed.retain(|loose| loose.by_itself > 0.0);
+        (self.loose, self.between) = (mixed, between);
+    }
+
     /// Adds to the cost: half of ρ.
     #[inline]
     pub fn add_cost(&mut self, half_rho: f64) {
@@ -226,6 +283,11 @@ impl<const S: usize, const B: usize> BlockNormal<S, B> {
             }
             into.information[i * n + i] += (1.0 + damping) * loose.by_itself;
             into.score[i] += loose.right;
+        }
+        let n_between = self.between.len().isqrt();
+        for (i, row) in self.between.chunks(n_between.max(1)).enumerate() {
+            let sums = &mut into.information[(S + i) * n + S..][..i];
+            sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += value);
         }
         // The products of one row with all before it, side by side; then each to its place.
         let mut columns = vec![0.0; B * rows.len()];
