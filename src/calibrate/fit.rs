@@ -94,10 +94,7 @@ impl Fit {
 
     /// The numbers of the board's surface.
     pub(super) fn form(&self, shape: &Shape<'_>) -> Form {
-        Form {
-            shared: shape.surface_numbers(&self.free).to_vec(),
-            knots_m: self.knots_m.clone(),
-        }
+        Form { shared: shape.surface_numbers(&self.free).to_vec(), knots_m: self.knots_m.clone() }
     }
 
     pub(super) fn start(&self) -> Start<'_> {

@@ -61,7 +61,10 @@ enum ReadyLens<'a> {
     None,
     /// And the table of which a free share it is, where it is.
     Table(Cow<'a, RadialTable>, Option<&'a RadialTable>),
-    Brown { lens: Brown, first_dip: f64 },
+    Brown {
+        lens: Brown,
+        first_dip: f64,
+    },
 }
 
 impl<'a, const S: usize> Reprojection<'a, S> {
@@ -330,9 +333,8 @@ impl<const S: usize> Reprojection<'_, S> {
             });
             sums.add(&rows);
             if !knots_m.is_empty() {
-                let d_loose = drawn
-                    .by_point
-                    .map(|[a, b, c]| a * m[(0, 2)] + b * m[(1, 2)] + c * m[(2, 2)]);
+                let d_loose =
+                    drawn.by_point.map(|[a, b, c]| a * m[(0, 2)] + b * m[(1, 2)] + c * m[(2, 2)]);
                 let [wa, wb] = d_loose.map(|d| weight * d);
                 let [a, b] = &rows;
                 let by_shared: [f64x8<I>; S] =

@@ -78,14 +78,18 @@ impl Sheet {
     /// with ν = 3/2 (once differentiable), (1 + d)·exp(−d), d = √3·distance/length. Between knots the surface is that of
     /// cubic convolution (Keys 1981).
     pub(super) fn new(board: &CharucoBoard) -> Self {
+        Self::on_knots(board, MAX_KNOTS)
+    }
+
+    fn on_knots(board: &CharucoBoard, max_knots: usize) -> Self {
         let flat = Self::flat(board);
         let n_corners = board.n_corners();
         let corners: Vec<Vector3<f64>> = (0..n_corners).map(|id| board.corner(id).coords).collect();
         let [columns, rows] = [board.squares_x, board.squares_y].map(|n| n - 1);
-        let (mixture, knots, pitch_m) = if n_corners <= MAX_KNOTS {
+        let (mixture, knots, pitch_m) = if n_corners <= max_knots {
             (None, corners.clone(), board.square_m)
         } else {
-            let [across, down] = knots_along([columns, rows]);
+            let [across, down] = knots_along([columns, rows], max_knots);
             let [dx, dy] = [across.pitch(), down.pitch()].map(|pitch| pitch * board.square_m);
             let knots = (0..across.n_knots * down.n_knots).map(|at| {
                 let (i, j) = (at % across.n_knots, at / across.n_knots);
@@ -286,7 +290,7 @@ struct Along {
 }
 
 /// As many knots as there may be, alike apart along both sides as far as their numbers allow: at least four along each.
-fn knots_along(n_corners: [usize; 2]) -> [Along; 2] {
+fn knots_along(n_corners: [usize; 2], max_knots: usize) -> [Along; 2] {
     let spread = |pitch: f64| {
         n_corners.map(|n_corners| {
             let n_knots = ((n_corners - 1) as f64 / pitch) as usize + 1;
@@ -294,7 +298,7 @@ fn knots_along(n_corners: [usize; 2]) -> [Along; 2] {
         })
     };
     let mut pitch = 1.0;
-    while spread(pitch).iter().map(|along| along.n_knots).product::<usize>() > MAX_KNOTS {
+    while spread(pitch).iter().map(|along| along.n_knots).product::<usize>() > max_knots {
         pitch *= 1.01;
     }
     spread(pitch)
@@ -337,7 +341,7 @@ impl Along {
 }
 
 /// The plane z = p.x + p.y·x + p.z·y nearest to these heights.
-fn best_plane(places: &[Vector3<f64>], heights: &[f64]) -> Vector3<f64> {
+pub(super) fn best_plane(places: &[Vector3<f64>], heights: &[f64]) -> Vector3<f64> {
     let (mut ata, mut atb) = (Matrix3::zeros(), Vector3::zeros());
     for (place, height) in places.iter().zip(heights) {
         let row = Vector3::new(1.0, place.x, place.y);
@@ -345,4 +349,94 @@ fn best_plane(places: &[Vector3<f64>], heights: &[f64]) -> Vector3<f64> {
         atb += row * *height;
     }
     ata.try_inverse().map_or(Vector3::zeros(), |inverse| inverse * atb)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        calibrate::{
+            Input,
+            fit::{Data, Start, Wanted, fit},
+            model::{Aspect, Center, Shape, Warp},
+            problem::Measured,
+            synthetic::{self, FACTORY, Scene},
+            views::{all_usable, pictures},
+        },
+        camera::Distortion,
+        pose::Weighting,
+        solve::{Loss, rms},
+    };
+
+    /// A plane through the knots is a plane through the corners; a smooth surface is met between them.
+    #[test]
+    fn knots_carry_smooth_surfaces() {
+        for (text, n_knots) in [("20x15:14mm:7mm:4X4_250", 192), ("40x30:7mm:3.5mm:6X6_1000", 192)]
+        {
+            let board: CharucoBoard = text.parse().unwrap();
+            let sheet = Sheet::new(&board);
+            assert_eq!(sheet.n_knots(Surface::Free), n_knots);
+            let [across, down] = knots_along([board.squares_x - 1, board.squares_y - 1], MAX_KNOTS);
+            let pitch = [across, down].map(|along| along.pitch() * board.square_m);
+            let at_knots = |form: fn(f64, f64) -> f64| -> Vec<f64> {
+                let place = |k: usize| [k % across.n_knots, k / across.n_knots];
+                let place = |k| std::array::from_fn(|i| place(k)[i] as f64 * pitch[i]);
+                (0..n_knots).map(place).map(|[x, y]: [f64; 2]| form(x, y)).collect()
+            };
+            let worst = |form: fn(f64, f64) -> f64| {
+                let knots_m = at_knots(form);
+                let origin = board.corner(0).coords;
+                (0..board.n_corners())
+                    .map(|id| {
+                        let place = board.corner(id).coords - origin;
+                        (sheet.height_m(id, &knots_m) - form(place.x, place.y)).abs()
+                    })
+                    .fold(0.0, f64::max)
+            };
+            assert!(worst(|x, y| 1e-3 + 0.02 * x - 0.01 * y) < 1e-12, "{text}");
+            // Half a millimetre, 120 mm from crest to crest; at the border the second derivative is not known.
+            let ripple = |x: f64, y: f64| 2.5e-4 * ((52.0 * x).sin() + (52.0 * y).cos());
+            assert!(worst(ripple) < 6e-5, "{text}: {}", worst(ripple));
+        }
+    }
+
+    /// The paper's board with fewer knots than corners: the same calibration to well below its σ.
+    #[test]
+    fn fewer_knots_say_the_same() {
+        let board = synthetic::board();
+        let scene = Scene { wave_m: 5e-4, noise_px: 0.1, ..Scene::new(Distortion::None) };
+        let frames = scene.frames(5);
+        let input = Input { board: &board, factory: &FACTORY, tables: None, frames: &frames };
+        let gathered = all_usable(&input, 6, Weighting::Equal);
+        let views: Vec<&Measured> = gathered.views.iter().collect();
+        let poses: Vec<_> = gathered.views.iter().map(|v| v.pose).collect();
+        let (center, aspect, surface) = (Center::Free, Aspect::Fixed, Surface::Free);
+        let shape = Shape { center, warp: Warp::None, aspect, surface };
+        let [all, few] = [MAX_KNOTS, 40].map(|max_knots| {
+            let sheet = Sheet::on_knots(&board, max_knots);
+            let data = Data {
+                factory: &FACTORY,
+                views: &views,
+                pictures: &pictures(&views, 640),
+                loss: Loss::Squared,
+                sheet: &sheet,
+                cost_tolerance: 1e-12,
+                wanted: Wanted::Everything,
+            };
+            let free = shape.start(&FACTORY);
+            let fit =
+                fit(shape, &data, Start { free: &free, knots_m: &[], poses: &poses }).unwrap();
+            let covariance = fit.covariance.as_ref().unwrap();
+            let found = sheet.surface(surface, &fit.form(&shape), covariance).unwrap();
+            (fit.knots_m.len(), fit.focal_px(), found)
+        });
+        assert_eq!((all.0, few.0), (63, 35));
+        let focal = (all.1.value - few.1.value) / all.1.sigma;
+        assert!(focal.abs() < 0.2, "{focal}");
+        assert!((few.1.sigma / all.1.sigma - 1.0).abs() < 0.1, "{:?} {:?}", all.1, few.1);
+        let off: Vec<f64> = (0..board.n_corners())
+            .map(|id| (all.2.heights_m[id] - few.2.heights_m[id]) / all.2.sigmas_m[id])
+            .collect();
+        assert!(rms(&off) < 0.5, "{}", rms(&off));
+    }
 }

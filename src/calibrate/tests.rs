@@ -6,7 +6,10 @@ use super::{
     synthetic::{FACTORY, Random, Scene, board, pose, tables},
 };
 use crate::{
+    board::CharucoBoard,
     camera::{Brown, Distortion, Intrinsics, TablePair},
+    detect::Corner,
+    geom::{Board, Color, Pixel, Point, Pose, Rotation, Vector3},
     solve::{mean, rms},
 };
 
@@ -307,6 +310,66 @@ fn finds_the_shape_of_the_board() {
         };
         let size = surface.size_m();
         assert!((size.value - range(&truth)).abs() < 4.0 * size.sigma, "{size:?}");
+    }
+}
+
+/// Boards of 266 and of 1131 corners: their surfaces are free, too, on fewer knots than corners.
+#[test]
+fn finds_the_shape_of_large_boards() {
+    for text in ["20x15:14mm:7mm:4X4_250", "40x30:7mm:3.5mm:6X6_1000"] {
+        let board: CharucoBoard = text.parse().unwrap();
+        let camera = Scene::new(Distortion::None).camera;
+        let size = [board.squares_x, board.squares_y].map(|n| n as f64 * board.square_m);
+        let height_m = |p: &Point<Board>| {
+            let [s, t] = [2.0 * p.x() / size[0] - 1.0, 2.0 * p.y() / size[1] - 1.0];
+            5e-4 * (0.6 * s * s + 0.3 * t * t - 0.7 * s * t + 0.8 * s * s * s)
+        };
+        let mut random = Random(11);
+        let frames: Vec<FrameCorners> = (0..16)
+            .map(|frame| {
+                let azimuth = random.uniform(0.0, std::f64::consts::TAU);
+                let tilt =
+                    Vector3::new(azimuth.cos(), azimuth.sin(), 0.0) * random.uniform(0.2, 0.7);
+                let turn = Rotation::from_scaled_axis(tilt);
+                let middle = Vector3::new(0.5 * size[0], 0.5 * size[1], 0.0);
+                let at = [(-0.03, 0.03), (-0.03, 0.03), (0.3, 0.5)]
+                    .map(|(low, high)| random.uniform(low, high));
+                let pose = Pose::<Color, Board>::new(turn, Vector3::from(at) - turn * middle);
+                let mut see = |id| {
+                    let flat = board.corner(id);
+                    let point = Point::new(flat.x(), flat.y(), height_m(&flat));
+                    let pixel = camera.project(pose * point)?;
+                    let pixel = Pixel::new(
+                        pixel.x + 0.05 * random.normal(),
+                        pixel.y + 0.05 * random.normal(),
+                    );
+                    let inside = (2.0..637.0).contains(&pixel.x) && (2.0..477.0).contains(&pixel.y);
+                    inside.then_some(Corner { id, pixel, sigma_px: 0.05 })
+                };
+                let corners = (0..board.n_corners()).filter_map(&mut see).collect();
+                FrameCorners { frame, corners }
+            })
+            .collect();
+        let input = Input { board: &board, factory: &FACTORY, tables: None, frames: &frames };
+        let found = calibrate(&input, Method::Robust(Model::FocalCentre)).unwrap();
+        let surface = found.surface.as_ref().unwrap();
+        assert_eq!(surface.kind, SurfaceKind::Free, "{text}");
+        assert!(found.rms_px < 0.075, "√2·0.05 is all that is left: {}", found.rms_px);
+        assert!(normalised(found.focal_px(), 531.0).abs() < 4.0, "{:?}", found.focal_px());
+        // Less the plane of the poses: the difference of two surfaces without a plane of its own.
+        let off: Vec<f64> = (0..board.n_corners())
+            .map(|id| surface.heights_m[id] - height_m(&board.corner(id)))
+            .collect();
+        let places = (0..board.n_corners()).map(|id| board.corner(id).coords).collect::<Vec<_>>();
+        let plane = super::surface::best_plane(&places, &off);
+        let off: Vec<f64> = places
+            .iter()
+            .zip(&off)
+            .zip(&surface.sigmas_m)
+            .map(|((p, off), sigma)| (off - (plane.x + plane.y * p.x + plane.z * p.y)) / sigma)
+            .collect();
+        assert!(rms(&off) > 0.3 && rms(&off) < 1.6, "{text}: {}", rms(&off));
+        assert!(surface.sigmas_m.iter().all(|s| *s < 5e-5), "{text}");
     }
 }
 

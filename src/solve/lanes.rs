@@ -30,13 +30,7 @@ impl<I: Simd, const S: usize, const B: usize> Sums<I, S, B> {
     #[inline(always)]
     pub(crate) fn zero(simd: I) -> Self {
         let zero = f64x8::splat(simd, 0.0);
-        Self {
-            u: [[zero; S]; S],
-            w: [[zero; B]; S],
-            v: [[zero; B]; B],
-            g: [zero; S],
-            h: [zero; B],
-        }
+        Self { u: [[zero; S]; S], w: [[zero; B]; S], v: [[zero; B]; B], g: [zero; S], h: [zero; B] }
     }
 
     /// Both coordinates of eight pixels.

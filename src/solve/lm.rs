@@ -21,6 +21,9 @@ pub trait LeastSquares {
 
     /// `state` moved by `step`.
     fn advance(&self, state: &Self::State, step: &Self::Step) -> Self::State;
+
+    /// These normal equations after a step, as they say themselves: their matrix stays.
+    fn follow(&self, normal: &mut Self::Normal, step: &Self::Step);
 }
 
 /// A step and what it promises.
@@ -54,9 +57,10 @@ impl Default for Effort {
 pub struct Minimum<S, N> {
     /// The state.
     pub state: S,
-    /// The normal equations there, to within the last step, which gains a share of 1e4 tolerances of the cost at most.
+    /// The normal equations there: their matrix to within the last step, which gains a share of 1e4 tolerances of the
+    /// cost at most.
     pub normal: N,
-    /// Half the (robust) sum of squares before that last step.
+    /// Half the (robust) sum of squares.
     pub cost: f64,
     /// Linearisations made.
     pub n_iterations: usize,
@@ -87,7 +91,7 @@ pub fn minimize<P: LeastSquares>(
     }
     let mut damping = 1e-4;
     let mut growth = 2.0;
-    // What the step before promised.
+    // What the step before promised, where it was taken.
     let mut promised = 0.0;
     let mut n_iterations = 1;
     let mut converged = false;
@@ -114,6 +118,8 @@ pub fn minimize<P: LeastSquares>(
             // The last step costs nothing but itself, and leaves its own square as the error.
             if predicted_decrease > 0.0 {
                 state = problem.advance(&state, &step);
+                problem.follow(&mut normal, &step);
+                cost = problem.cost(&normal);
             }
             converged = true;
             break;
@@ -140,6 +146,7 @@ pub fn minimize<P: LeastSquares>(
                 }
                 damping *= growth;
                 growth *= 2.0;
+                promised = 0.0;
             }
         }
     }

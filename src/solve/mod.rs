@@ -61,9 +61,11 @@ mod covariance;
 
 pub use cholesky::{Cholesky, DenseCholesky};
 pub use covariance::{LeftOut, Pooled, larger, total};
-pub use lm::{Effort, LeastSquares, Minimum, Solution, minimize};
 pub(crate) use lanes::{LANES, Rows, Sums, sum};
+pub use lm::{Effort, LeastSquares, Minimum, Solution, minimize};
 pub use loss::Loss;
-pub use schur::{Arrow, ArrowNormal, BlockNormal, Bordered, BySchur, Mixture, Reduced, Response, Row};
+pub use schur::{
+    Arrow, ArrowNormal, BlockNormal, Bordered, BySchur, Mixture, Reduced, Response, Row,
+};
 pub(crate) use simd::vectorized;
 pub use stats::{mad_sigma, mean, median, quantile, rms, standard_deviation, standard_error};

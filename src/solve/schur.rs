@@ -314,6 +314,57 @@ impl<const S: usize, const B: usize> BlockNormal<S, B> {
         Some(Eliminated { factor, rows, z })
     }
 
+    /// After a step of the shared and loose parameters and of its own.
+    fn follow(&mut self, border: &[f64], own: &[f64; B]) {
+        // ½·δᵀ·(before + after) is what the step gains.
+        let mut gain = 0.0;
+        let lower = |i: usize, j: usize| (i.max(j), i.min(j));
+        let mut h = self.h;
+        for k in 0..B {
+            let by_own: f64 = (0..B)
+                .map(|l| {
+                    let (a, b) = lower(k, l);
+                    self.v[a][b] * own[l]
+                })
+                .sum();
+            let by_shared: f64 = (0..S).map(|i| self.w[i][k] * border[i]).sum();
+            let by_loose: f64 =
+                self.loose.iter().map(|l| l.by_block[k] * border[S + l.parameter]).sum();
+            h[k] -= by_own + by_shared + by_loose;
+            gain += own[k] * (self.h[k] + h[k]);
+        }
+        let mut g = self.g;
+        for i in 0..S {
+            let by_shared: f64 = (0..S)
+                .map(|j| {
+                    let (a, b) = lower(i, j);
+                    self.u[a][b] * border[j]
+                })
+                .sum();
+            let by_own: f64 = (0..B).map(|k| self.w[i][k] * own[k]).sum();
+            let by_loose: f64 =
+                self.loose.iter().map(|l| l.by_shared[i] * border[S + l.parameter]).sum();
+            g[i] -= by_shared + by_own + by_loose;
+            gain += border[i] * (self.g[i] + g[i]);
+        }
+        let n = self.between.len().isqrt();
+        for loose in &mut self.loose {
+            let (at, before) = (loose.parameter, loose.right);
+            let by_shared: f64 = (0..S).map(|i| loose.by_shared[i] * border[i]).sum();
+            let by_own: f64 = (0..B).map(|k| loose.by_block[k] * own[k]).sum();
+            let by_others: f64 = (0..n)
+                .map(|other| {
+                    let (a, b) = lower(at, other);
+                    self.between[a * n + b] * border[S + other]
+                })
+                .sum();
+            loose.right -= by_shared + by_own + by_others + loose.by_itself * border[S + at];
+            gain += border[S + at] * (before + loose.right);
+        }
+        (self.h, self.g) = (h, g);
+        self.cost -= 0.5 * gain;
+    }
+
     /// Adds what this block says about the shared and loose parameters once its own are eliminated; false, and nothing
     /// added, where its own are not determined.
     pub fn reduce_into(&self, sum: &mut Reduced) -> bool {
@@ -505,6 +556,19 @@ impl<P: Bordered<S, B>, const S: usize, const B: usize> LeastSquares for BySchur
             .collect();
         Arrow { shared, loose, blocks }
     }
+
+    fn follow(&self, normal: &mut Self::Normal, step: &Self::Step) {
+        let border: Vec<f64> = step.shared.iter().chain(&step.loose).copied().collect();
+        let prior = &mut normal.prior;
+        for (i, row) in prior.information.chunks(border.len().max(1)).enumerate() {
+            let before = prior.score[i];
+            prior.score[i] -= row.iter().zip(&border).map(|(a, x)| a * x).sum::<f64>();
+            normal.prior_cost -= 0.5 * border[i] * (before + prior.score[i]);
+        }
+        for (block, own) in normal.blocks.iter_mut().zip(&step.blocks) {
+            block.follow(&border, own);
+        }
+    }
 }
 
 impl<P: Bordered<S, B>, const S: usize, const B: usize> BySchur<'_, P, S, B> {
@@ -682,6 +746,52 @@ mod tests {
                 }
             }
             assert!((quadratic - predicted_decrease).abs() < 1e-9 * quadratic);
+        }
+    }
+
+    /// What a block says of mixed parameters is what it says of the numbers that they are mixed to.
+    #[test]
+    fn mixed_parameters_are_a_change_of_variables() {
+        let (mut problem, mut start) = decays(0.01);
+        problem.loose_precision = vec![0.0; 9];
+        start.loose = vec![0.3, -0.2, 0.1];
+        let plain = BySchur(&problem).linearize(&start).unwrap().blocks.swap_remove(1);
+        // The number at t = 0 says nothing; the mixture of the others is invertible all the same.
+        let shares = vec![
+            vec![(0, 1.0)],
+            vec![(0, 0.3), (1, 0.5), (2, 0.7)],
+            vec![(2, 2.0), (0, -0.5), (1, 0.2)],
+        ];
+        let mut mixed = plain.clone();
+        mixed.mix_loose(&Mixture { shares: shares.clone(), n_parameters: 3 });
+        let mut change = [[0.0; 5]; 5];
+        (change[0][0], change[1][1]) = (1.0, 1.0);
+        for (number, shares) in shares.iter().enumerate() {
+            shares.iter().for_each(|(k, share)| change[2 + number][2 + k] = *share);
+        }
+        let (mut before, mut after) = (Reduced::zero(5), Reduced::zero(5));
+        assert!(plain.reduce_into(&mut before) && mixed.reduce_into(&mut after));
+        let step = [0.01, -0.02, 0.3, -0.1, 0.2];
+        let [mut stepped, mut whole] = [mixed.clone(), plain.clone()];
+        let moved: Vec<f64> = change.map(|row| (0..5).map(|j| row[j] * step[j]).sum()).to_vec();
+        stepped.follow(&step, &[0.1, -0.3]);
+        whole.follow(&moved, &[0.1, -0.3]);
+        assert!((stepped.cost - whole.cost).abs() < 1e-9 * plain.cost);
+        for k in 0..2 {
+            assert!((stepped.h[k] - whole.h[k]).abs() < 1e-9 * plain.h[k].abs().max(1.0));
+        }
+        for i in 0..5 {
+            let score: f64 = (0..5).map(|k| change[k][i] * before.score[k]).sum();
+            assert!((after.score[i] - score).abs() < 1e-9 * score.abs().max(1.0));
+            for j in 0..5 {
+                let mut sum = 0.0;
+                for k in 0..5 {
+                    for l in 0..5 {
+                        sum += change[k][i] * before.information[5 * k + l] * change[l][j];
+                    }
+                }
+                assert!((after.information[5 * i + j] - sum).abs() < 1e-9 * sum.abs().max(1.0));
+            }
         }
     }
 
