@@ -13,7 +13,7 @@ use super::{
 use crate::{
     camera::{Brown, Intrinsics, RadialTable},
     detect::Corner,
-    geom::{Board, Color, Pixel, Pose, Vector3},
+    geom::{Board, Color, Matrix3, Pixel, Pose, Vector3},
     pose,
     solve::{BlockNormal, Bordered, LANES, Loss, Rows, Sums, sum},
 };
@@ -141,9 +141,10 @@ impl Ready<'_> {
                     }
                 }
                 let load = |numbers: [f64; LANES]| f64x8::simd_from(simd, numbers);
-                let [[a, b], [c, d]] = j.map(|row| row.map(load));
+                let [a, b] = [load(j[0][0]), load(j[0][1])];
+                let [c, d] = [load(j[1][0]), load(j[1][1])];
                 self.by_pinhole(&mut by_shared, [u, v], [[a, b], [c, d]]);
-                (pixel.map(load), [[a * fx, b * fy], [c * fx, d * fy]])
+                ([load(pixel[0]), load(pixel[1])], [[a * fx, b * fy], [c * fx, d * fy]])
             }
             ReadyLens::Brown { lens: brown, first_dip } => {
                 let [[a, b], [c, d]] = brown.by_ray([u, v]);
@@ -201,6 +202,13 @@ impl Ready<'_> {
 /// a quarter of a radian and some centimetres a second, and reading takes some ten milliseconds.
 const MOTION_SIGMA: [f64; 6] = [4e-3, 4e-3, 4e-3, 2e-3, 2e-3, 2e-3];
 
+/// Eight points after a rotation.
+#[inline(always)]
+fn rotated<I: Simd>(m: &Matrix3<f64>, [x, y, z]: [f64x8<I>; 3]) -> [f64x8<I>; 3] {
+    let row = |r: usize| x * m[(r, 0)] + y * m[(r, 1)] + z * m[(r, 2)];
+    [row(0), row(1), row(2)]
+}
+
 /// A number of each of up to eight items; lanes beyond the last are that one again.
 #[inline(always)]
 fn gather<I: Simd, T>(simd: I, items: &[T], number: impl Fn(&T) -> f64) -> f64x8<I> {
@@ -235,7 +243,11 @@ impl Own<6> for Still {
 impl Own<12> for Moving {
     #[inline(always)]
     fn derivatives<I: Simd>(by_pose: [f64x8<I>; 6], time: f64x8<I>) -> [f64x8<I>; 12] {
-        std::array::from_fn(|k| if k < 6 { by_pose[k] } else { time * by_pose[k - 6] })
+        let mut by = [time; 12];
+        for k in 0..6 {
+            (by[k], by[6 + k]) = (by_pose[k], time * by_pose[k]);
+        }
+        by
     }
 }
 
@@ -272,9 +284,6 @@ impl<const S: usize> Reprojection<'_, S> {
         let ready = self.ready(shared);
         let view = self.views[index];
         let m = pose.rotation.matrix();
-        let turn = |[x, y, z]: [f64x8<I>; 3]| {
-            [0, 1, 2].map(|r| x * m[(r, 0)] + y * m[(r, 1)] + z * m[(r, 2)])
-        };
         let surface = self.shape.surface;
         let numbers = self.shape.surface_numbers(shared);
         let first = S - numbers.len();
@@ -298,7 +307,7 @@ impl<const S: usize> Reprojection<'_, S> {
             if !knots_m.is_empty() {
                 place[2] += gather(simd, corners, |c| self.sheet.height_m(c.id, knots_m));
             }
-            let turned = turn(place);
+            let turned = rotated(m, place);
             let t = &pose.translation;
             let [tx, ty, tz] = turned;
             let Some(drawn) = ready.project::<I, S>(simd, [tx + t.x, ty + t.y, tz + t.z]) else {
@@ -320,27 +329,38 @@ impl<const S: usize> Reprojection<'_, S> {
                 }
             };
             let time = (seen[1] + 0.5) * per_row - 0.5;
-            let rows = [0, 1].map(|axis| {
+            let nothing = Rows {
+                weight,
+                residual: residual[0],
+                d_shared: drawn.by_shared[0],
+                d_block: [weight; B],
+            };
+            let mut rows = [nothing; 2];
+            for (axis, row) in rows.iter_mut().enumerate() {
                 let [a, b, c] = drawn.by_point[axis];
-                let mut d_shared = drawn.by_shared[axis];
-                for (derivative, by) in d_shared[first..].iter_mut().zip(by_surface) {
-                    let [x, y, z] = turn(by);
+                row.residual = residual[axis];
+                row.d_shared = drawn.by_shared[axis];
+                for (derivative, by) in row.d_shared[first..].iter_mut().zip(by_surface) {
+                    let [x, y, z] = rotated(m, by);
                     *derivative = a * x + b * y + c * z;
                 }
                 let by_pose = [ty * c - tz * b, tz * a - tx * c, tx * b - ty * a, a, b, c];
-                let d_block = O::derivatives(by_pose, time);
-                Rows { weight, residual: residual[axis], d_shared, d_block }
-            });
+                row.d_block = O::derivatives(by_pose, time);
+            }
             sums.add(&rows);
             if !knots_m.is_empty() {
-                let d_loose =
-                    drawn.by_point.map(|[a, b, c]| a * m[(0, 2)] + b * m[(1, 2)] + c * m[(2, 2)]);
-                let [wa, wb] = d_loose.map(|d| weight * d);
+                let along =
+                    |[a, b, c]: [f64x8<I>; 3]| a * m[(0, 2)] + b * m[(1, 2)] + c * m[(2, 2)];
+                let d_loose = [along(drawn.by_point[0]), along(drawn.by_point[1])];
+                let [wa, wb] = [weight * d_loose[0], weight * d_loose[1]];
                 let [a, b] = &rows;
-                let by_shared: [f64x8<I>; S] =
-                    std::array::from_fn(|i| wa * a.d_shared[i] + wb * b.d_shared[i]);
-                let by_block: [f64x8<I>; B] =
-                    std::array::from_fn(|i| wa * a.d_block[i] + wb * b.d_block[i]);
+                let (mut by_shared, mut by_block) = ([weight; S], [weight; B]);
+                for i in 0..S {
+                    by_shared[i] = wa * a.d_shared[i] + wb * b.d_shared[i];
+                }
+                for i in 0..B {
+                    by_block[i] = wa * a.d_block[i] + wb * b.d_block[i];
+                }
                 let by_itself = wa * d_loose[0] + wb * d_loose[1];
                 let right = wa * a.residual + wb * b.residual;
                 for (lane, corner) in corners.iter().enumerate() {

@@ -76,26 +76,51 @@ fn shrunk(image: &Rgb, max_width: usize) -> Rgb {
         return image.clone();
     }
     let mut pixels = Vec::with_capacity(width * height);
-    // Sums along a row of blocks: memory is read once, in order.
-    let mut sums = vec![[0u32; 3]; width];
     let columns = (width * factor).min(image.width());
+    // Rows of a block are added channel by channel first, which vectors do; then what lies side by side.
+    let mut sums = vec![0_u32; 3 * columns];
     for y in 0..height {
-        sums.fill([0; 3]);
+        sums.fill(0);
         let rows = y * factor..((y + 1) * factor).min(image.height());
         for row in rows.clone() {
-            let row = &image.pixels()[row * image.width()..][..columns];
-            for (block, sum) in row.chunks(factor).zip(&mut sums) {
-                for pixel in block {
-                    for (sum, channel) in sum.iter_mut().zip(pixel) {
-                        *sum += u32::from(*channel);
-                    }
-                }
-            }
+            let row = image.pixels()[row * image.width()..][..columns].as_flattened();
+            sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += u32::from(*value));
         }
-        let count = (rows.len() * factor.min(columns)) as u32;
-        pixels.extend(sums.iter().map(|sum| sum.map(|sum| ((sum + count / 2) / count) as u8)));
+        let mean = MeanOf::new((rows.len() * factor.min(columns)) as u32);
+        let (triples, _) = sums.as_chunks::<3>();
+        pixels.extend(triples.chunks(factor).map(|block| {
+            let mut sum = [0; 3];
+            for triple in block {
+                (0..3).for_each(|channel| sum[channel] += triple[channel]);
+            }
+            sum.map(|sum| mean.of(sum))
+        }));
     }
     Rgb::new(width, height, pixels)
+}
+
+/// Divides sums of so many values by their number, rounded to nearest, without dividing.
+#[derive(Clone, Copy)]
+struct MeanOf {
+    count: u32,
+    /// ⌊2³²/count⌋ + 1: a product with it is right as long as sum·count stays below 2³².
+    inverse: u64,
+}
+
+impl MeanOf {
+    fn new(count: u32) -> Self {
+        Self { count, inverse: (1 << 32) / u64::from(count) + 1 }
+    }
+
+    #[inline]
+    fn of(self, sum: u32) -> u8 {
+        let rounded = sum + self.count / 2;
+        if self.count < 4096 {
+            ((u64::from(rounded) * self.inverse) >> 32) as u8
+        } else {
+            (rounded / self.count) as u8
+        }
+    }
 }
 
 /// RFC 4648, section 4.
@@ -146,6 +171,19 @@ mod tests {
         assert_eq!(photo.size_px, (1601, 3));
         assert_eq!(&photo.jpeg[..3], &[0xff, 0xd8, 0xff]);
         assert!(photo.data_uri().starts_with("data:image/jpeg;base64,/9j/"));
+    }
+
+    #[test]
+    fn means_are_rounded_as_by_division() {
+        for count in (1..4200).step_by(7).chain([1, 2, 4, 9, 16, 4095, 4096, 4097]) {
+            let mean = MeanOf::new(count);
+            for value in 0..=255 {
+                for sum in [value * count, value * count + count / 2, (value * count).max(1) - 1] {
+                    let sum = sum.min(255 * count);
+                    assert_eq!(mean.of(sum), ((sum + count / 2) / count) as u8, "{sum}/{count}");
+                }
+            }
+        }
     }
 
     #[test]
