@@ -13,15 +13,15 @@ use crate::{
 /// corners say so.
 const SIGMA_SHARE: f64 = 0.005;
 
-/// Over how many knots the height of a free surface is alike beforehand; each corner of a board of some ten by ten squares
-/// is a knot. Paper glued onto card ripples with about twice that from crest to crest.
+/// Over how many knots the height of a free surface is alike beforehand; each corner of a board of some ten by ten
+/// squares is a knot. Paper glued onto card ripples with about twice that from crest to crest.
 const SMOOTH_KNOTS: f64 = 2.0;
 
 /// How far a print may be stretched and sheared: printers are good to a tenth of a percent.
 const PRINT_SIGMA: f64 = 1e-3;
 
-/// A free surface has a height for each corner of a board with up to so many; on a larger one the corners lie on a surface
-/// through the heights of so many knots. A sheet of paper ripples with its size, not with that of its squares.
+/// A free surface has a height for each corner of a board with up to so many; on a larger one the corners lie on a
+/// surface through the heights of so many knots. A sheet of paper ripples with its size, not with that of its squares.
 const MAX_KNOTS: usize = 200;
 
 /// What is taken for known of the board's shape.
@@ -74,9 +74,9 @@ pub(super) struct Sheet {
 }
 
 impl Sheet {
-    /// The heights of a free surface's knots are a Gaussian process beforehand: σ as above, correlation of Matérn's form
-    /// with ν = 3/2 (once differentiable), (1 + d)·exp(−d), d = √3·distance/length. Between knots the surface is that of
-    /// cubic convolution (Keys 1981).
+    /// The heights of a free surface's knots are a Gaussian process beforehand: σ as above, correlation of Matérn's
+    /// form with ν = 3/2 (once differentiable), (1 + d)·exp(−d), d = √3·distance/length. Between knots the surface is
+    /// that of cubic convolution (Keys 1981).
     pub(super) fn new(board: &CharucoBoard) -> Self {
         Self::on_knots(board, MAX_KNOTS)
     }

@@ -57,6 +57,8 @@ mod schur;
 
 mod lanes;
 
+mod mixture;
+
 mod covariance;
 
 pub use cholesky::{Cholesky, DenseCholesky};
@@ -64,8 +66,7 @@ pub use covariance::{LeftOut, Pooled, larger, total};
 pub(crate) use lanes::{LANES, Rows, Sums, sum};
 pub use lm::{Effort, LeastSquares, Minimum, Solution, minimize};
 pub use loss::Loss;
-pub use schur::{
-    Arrow, ArrowNormal, BlockNormal, Bordered, BySchur, Mixture, Reduced, Response, Row,
-};
+pub use mixture::Mixture;
+pub use schur::{Arrow, ArrowNormal, BlockNormal, Bordered, BySchur, Reduced, Response, Row};
 pub(crate) use simd::vectorized;
 pub use stats::{mad_sigma, mean, median, quantile, rms, standard_deviation, standard_error};

@@ -8,8 +8,8 @@
 use super::{Cholesky, DenseCholesky, LeastSquares, Solution, simd::vectorized};
 
 /// A least-squares problem of `S` shared parameters, any number of *loose* ones, and any number of blocks of `B`
-/// parameters each: a residual depends on the shared parameters, on one block, and on one loose parameter at most (or on
-/// a [`Mixture`] of several).
+/// parameters each: a residual depends on the shared parameters, on one block, and on one loose parameter at most (or
+/// on a [`Mixture`](super::Mixture) of several).
 /// Bundle adjustment of intrinsics (shared), heights of a board's corners (loose) and poses (blocks) is one.
 ///
 /// Its normal equations have the shape of an arrow; the blocks are eliminated one by one (Schur complement), so that
@@ -63,32 +63,22 @@ pub struct BlockNormal<const S: usize, const B: usize> {
     /// h: right-hand side of the block's parameters.
     pub(super) h: [f64; B],
     /// The rows of the loose parameters that this block has to do with.
-    loose: Vec<Loose<S, B>>,
+    pub(super) loose: Vec<Loose<S, B>>,
     /// Loose by loose parameters beside the diagonal: row-major, of all of them; empty where there is nothing.
-    between: Vec<f64>,
+    pub(super) between: Vec<f64>,
     /// Half the (robust) sum of squares.
     cost: f64,
 }
 
-/// The rows of one loose parameter. Before they are mixed loose parameters never share a residual, so that U is diagonal
-/// among them.
+/// The rows of one loose parameter. Before they are mixed loose parameters never share a residual, so that U is
+/// diagonal among them.
 #[derive(Clone, Debug)]
-struct Loose<const S: usize, const B: usize> {
-    parameter: usize,
-    by_shared: [f64; S],
-    by_itself: f64,
-    by_block: [f64; B],
-    right: f64,
-}
-
-/// How numbers of which a residual depends on one at most are made of loose parameters: heights of many corners of those
-/// of few knots.
-#[derive(Clone, Debug)]
-pub struct Mixture {
-    /// For each number the loose parameters and their shares in it; none twice.
-    pub shares: Vec<Vec<(usize, f64)>>,
-    /// How many loose parameters there are.
-    pub n_parameters: usize,
+pub(super) struct Loose<const S: usize, const B: usize> {
+    pub(super) parameter: usize,
+    pub(super) by_shared: [f64; S],
+    pub(super) by_itself: f64,
+    pub(super) by_block: [f64; B],
+    pub(super) right: f64,
 }
 
 /// A residual (observed − predicted), its weight in the sum of squares, and the derivatives of the *prediction*.
@@ -207,36 +197,6 @@ impl<const S: usize, const B: usize> BlockNormal<S, B> {
         self.loose.push(Loose { parameter, by_shared, by_itself, by_block, right });
     }
 
-    /// Takes the loose parameters so far for mixtures of others.
-    pub fn mix_loose(&mut self, mixture: &Mixture) {
-        let n = mixture.n_parameters;
-        let zero = |parameter| Loose {
-            parameter,
-            by_shared: [0.0; S],
-            by_itself: 0.0,
-            by_block: [0.0; B],
-            right: 0.0,
-        };
-        let mut mixed: Vec<Loose<S, B>> = (0..n).map(zero).collect();
-        let mut between = vec![0.0; n * n];
-        for loose in &self.loose {
-            let shares = &mixture.shares[loose.parameter];
-            for (at, &(a, share)) in shares.iter().enumerate() {
-                let into = &mut mixed[a];
-                (0..S).for_each(|i| into.by_shared[i] += share * loose.by_shared[i]);
-                (0..B).for_each(|i| into.by_block[i] += share * loose.by_block[i]);
-                into.right += share * loose.right;
-                into.by_itself += share * share * loose.by_itself;
-                let weighted = share * loose.by_itself;
-                for &(b, other) in &shares[..at] {
-                    between[a.max(b) * n + a.min(b)] += weighted * other;
-                }
-            }
-        }
-        mixed.retain(|loose| loose.by_itself > 0.0);
-        (self.loose, self.between) = (mixed, between);
-    }
-
     /// Adds to the cost: half of ρ.
     #[inline]
     pub fn add_cost(&mut self, half_rho: f64) {
@@ -315,7 +275,7 @@ impl<const S: usize, const B: usize> BlockNormal<S, B> {
     }
 
     /// After a step of the shared and loose parameters and of its own.
-    fn follow(&mut self, border: &[f64], own: &[f64; B]) {
+    pub(super) fn follow(&mut self, border: &[f64], own: &[f64; B]) {
         // ½·δᵀ·(before + after) is what the step gains.
         let mut gain = 0.0;
         let lower = |i: usize, j: usize| (i.max(j), i.min(j));
@@ -594,16 +554,16 @@ impl<P: Bordered<S, B>, const S: usize, const B: usize> BySchur<'_, P, S, B> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::solve::{Effort, minimize};
 
     /// Curves y = aᵢ·exp(−k·t) + bᵢ + c·t² (1 + l_j at every tenth t): k and c shared, l loose, a and b of each curve
     /// its own.
-    struct Decays {
+    pub(in crate::solve) struct Decays {
         precision: [f64; 2],
         /// Of three loose parameters, or none.
-        loose_precision: Vec<f64>,
+        pub(in crate::solve) loose_precision: Vec<f64>,
         curves: Vec<Vec<(f64, f64)>>,
     }
 
@@ -649,7 +609,7 @@ mod tests {
         }
     }
 
-    fn decays(noise: f64) -> (Decays, Arrow<2, [f64; 2]>) {
+    pub(in crate::solve) fn decays(noise: f64) -> (Decays, Arrow<2, [f64; 2]>) {
         let truth = [[3.0, 1.0], [-2.0, 0.5], [1.0, 4.0]];
         let curves = truth
             .iter()
@@ -746,52 +706,6 @@ mod tests {
                 }
             }
             assert!((quadratic - predicted_decrease).abs() < 1e-9 * quadratic);
-        }
-    }
-
-    /// What a block says of mixed parameters is what it says of the numbers that they are mixed to.
-    #[test]
-    fn mixed_parameters_are_a_change_of_variables() {
-        let (mut problem, mut start) = decays(0.01);
-        problem.loose_precision = vec![0.0; 9];
-        start.loose = vec![0.3, -0.2, 0.1];
-        let plain = BySchur(&problem).linearize(&start).unwrap().blocks.swap_remove(1);
-        // The number at t = 0 says nothing; the mixture of the others is invertible all the same.
-        let shares = vec![
-            vec![(0, 1.0)],
-            vec![(0, 0.3), (1, 0.5), (2, 0.7)],
-            vec![(2, 2.0), (0, -0.5), (1, 0.2)],
-        ];
-        let mut mixed = plain.clone();
-        mixed.mix_loose(&Mixture { shares: shares.clone(), n_parameters: 3 });
-        let mut change = [[0.0; 5]; 5];
-        (change[0][0], change[1][1]) = (1.0, 1.0);
-        for (number, shares) in shares.iter().enumerate() {
-            shares.iter().for_each(|(k, share)| change[2 + number][2 + k] = *share);
-        }
-        let (mut before, mut after) = (Reduced::zero(5), Reduced::zero(5));
-        assert!(plain.reduce_into(&mut before) && mixed.reduce_into(&mut after));
-        let step = [0.01, -0.02, 0.3, -0.1, 0.2];
-        let [mut stepped, mut whole] = [mixed.clone(), plain.clone()];
-        let moved: Vec<f64> = change.map(|row| (0..5).map(|j| row[j] * step[j]).sum()).to_vec();
-        stepped.follow(&step, &[0.1, -0.3]);
-        whole.follow(&moved, &[0.1, -0.3]);
-        assert!((stepped.cost - whole.cost).abs() < 1e-9 * plain.cost);
-        for k in 0..2 {
-            assert!((stepped.h[k] - whole.h[k]).abs() < 1e-9 * plain.h[k].abs().max(1.0));
-        }
-        for i in 0..5 {
-            let score: f64 = (0..5).map(|k| change[k][i] * before.score[k]).sum();
-            assert!((after.score[i] - score).abs() < 1e-9 * score.abs().max(1.0));
-            for j in 0..5 {
-                let mut sum = 0.0;
-                for k in 0..5 {
-                    for l in 0..5 {
-                        sum += change[k][i] * before.information[5 * k + l] * change[l][j];
-                    }
-                }
-                assert!((after.information[5 * i + j] - sum).abs() < 1e-9 * sum.abs().max(1.0));
-            }
         }
     }
 
