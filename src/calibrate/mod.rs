@@ -78,6 +78,7 @@ mod synthetic;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use abreast::{abreast, both};
 pub use coverage::{Coverage, Tilt, coverage};
 pub use guess::guess_intrinsics;
 pub use job::{MAX_VIEWS, calibrate, calibrate_from, distortion_test};

@@ -126,18 +126,25 @@ impl MeanOf {
 /// RFC 4648, section 4.
 pub(super) fn base64(bytes: &[u8]) -> String {
     const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
-    for chunk in bytes.chunks(3) {
-        let bits = chunk
-            .iter()
-            .enumerate()
-            .fold(0u32, |bits, (i, &b)| bits | u32::from(b) << (16 - 8 * i));
-        for sextet in 0..4 {
-            let letter = ALPHABET[(bits >> (18 - 6 * sextet)) as usize & 63];
-            text.push(if sextet <= chunk.len() { char::from(letter) } else { '=' });
-        }
+    let letter = |bits: u32, shift: u32| ALPHABET[(bits >> shift) as usize & 63];
+    let mut text = Vec::with_capacity(bytes.len().div_ceil(3) * 4);
+    let (triples, rest) = bytes.as_chunks::<3>();
+    for &[a, b, c] in triples {
+        let bits = u32::from_be_bytes([0, a, b, c]);
+        text.extend([18, 12, 6, 0].map(|shift| letter(bits, shift)));
     }
-    text
+    match *rest {
+        [a] => {
+            let bits = u32::from_be_bytes([0, a, 0, 0]);
+            text.extend([letter(bits, 18), letter(bits, 12), b'=', b'=']);
+        }
+        [a, b] => {
+            let bits = u32::from_be_bytes([0, a, b, 0]);
+            text.extend([letter(bits, 18), letter(bits, 12), letter(bits, 6), b'=']);
+        }
+        _ => {}
+    }
+    String::from_utf8(text).expect("the alphabet is ASCII")
 }
 
 #[cfg(test)]

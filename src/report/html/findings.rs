@@ -144,7 +144,12 @@ fn cannot_tell(audit: &Audit, group: &words::CannotTell<'_>) -> Markup {
             div class="words" {
                 @if let Some(why) = &group.why { p class="summary" { (prose(why)) } }
                 @if !group.what_to_do.is_empty() {
-                    p class="to-do" { strong { "What to record. " } (prose(group.what_to_do)) }
+                    p class="to-do" {
+                        strong { "What to record. " } (prose(group.what_to_do))
+                        @if audit.calibration.is_none() && figures::view_angles(audit).is_some() {
+                            " " a href="#angles" { "From which sides the board was seen so far." }
+                        }
+                    }
                 }
             }
             ul class=(if group.why.is_some() { "checks waiting" } else { "checks" }) {

@@ -1,9 +1,10 @@
 //! The frames with what the detector saw in them.
 
-use maud::{Markup, html};
+use maud::{Markup, PreEscaped, html};
 
 use crate::{
     audit::{Audit, FrameAudit},
+    calibrate::abreast,
     report::{overlay::Overlay, photo::Photo, pictures::rms_px, svg::n, words},
 };
 
@@ -14,6 +15,7 @@ pub(super) fn gallery(audit: &Audit, photos: &[Photo]) -> Option<Markup> {
     if shown.is_empty() {
         return None;
     }
+    let pictures = abreast(&shown, |(photo, frame)| picture(audit, photo, frame));
     Some(html! {
         section class="gallery" id="frames" aria-labelledby="frames-title" {
             h2 id="frames-title" { "What the detector saw" }
@@ -37,7 +39,7 @@ pub(super) fn gallery(audit: &Audit, photos: &[Photo]) -> Option<Markup> {
                 }
             }
             ul class="frames" {
-                @for (photo, frame) in shown { li { (picture(audit, photo, frame)) } }
+                @for picture in pictures { li { (picture) } }
             }
         }
     })
@@ -57,7 +59,7 @@ fn picture(audit: &Audit, photo: &Photo, frame: &FrameAudit) -> Markup {
         figure {
             button type="button" class="zoom" aria-label=(format!("Enlarge {name}")) {
                 span class="picture" style=(format!("aspect-ratio: {width} / {height}")) {
-                    img id=(format!("photo-{}", photo.frame)) src=(photo.data_uri()) loading="lazy"
+                    img id=(format!("photo-{}", photo.frame)) src=(PreEscaped(photo.data_uri())) loading="lazy"
                         alt=(format!("Colour image {name}, {corners} found"));
                     svg viewBox=(view_box) aria-hidden="true" { (overlay.to_svg(width)) }
                 }

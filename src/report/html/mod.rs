@@ -14,7 +14,7 @@ use super::{
     pictures::Pictures,
     words,
 };
-use crate::audit::Audit;
+use crate::{audit::Audit, calibrate::both};
 
 /// Nothing may be loaded, from anywhere: images come as `data:`, style and script stand in the page.
 const POLICY: &str = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; \
@@ -41,9 +41,15 @@ pub(super) fn head(title: &str, style: &str) -> Markup {
 /// Everything that comes out of a file is escaped. The same audit and pictures give the same bytes.
 pub fn page(audit: &Audit, pictures: &Pictures, typed: &Typed) -> String {
     let title = format!("{} · truedepth audit", audit.name);
-    let closeups = closeups::closeups(audit, pictures);
-    let gallery = gallery::gallery(audit, &pictures.photos);
-    let evidence = evidence(audit);
+    let (evidence, (closeups, gallery)) = both(
+        || evidence(audit),
+        || {
+            both(
+                || closeups::closeups(audit, pictures),
+                || gallery::gallery(audit, &pictures.photos),
+            )
+        },
+    );
     let mut parts = vec![("findings", "Findings"), ("numbers", "Numbers")];
     parts.extend(closeups.as_ref().map(|_| ("closer", "Look")));
     parts.extend(evidence.iter().filter(|e| !e.3.is_empty()).map(|(id, name, ..)| (*id, *name)));
@@ -64,7 +70,7 @@ pub fn page(audit: &Audit, pictures: &Pictures, typed: &Typed) -> String {
                         @if !figures.is_empty() {
                             section class="evidence" id=(id) {
                                 h2 { (question) }
-                                div class="figures" { @for figure in figures { (figure.to_html()) } }
+                                div class="figures" { @for figure in figures { (figure) } }
                             }
                         }
                     }
@@ -81,7 +87,7 @@ pub fn page(audit: &Audit, pictures: &Pictures, typed: &Typed) -> String {
 }
 
 /// The figures, by the question they answer: id, name in the list of parts, question, figures.
-fn evidence(audit: &Audit) -> [(&'static str, &'static str, &'static str, Vec<Figure>); 3] {
+fn evidence(audit: &Audit) -> [(&'static str, &'static str, &'static str, Vec<Markup>); 3] {
     let depth = figures::depth_histograms(audit)
         .into_iter()
         .chain(figures::error_histogram(audit))
@@ -104,20 +110,19 @@ fn evidence(audit: &Audit) -> [(&'static str, &'static str, &'static str, Vec<Fi
         figures::board_shape(audit),
     ];
     [
-        ("depth", "Depth", "Is the depth true?", depth.collect()),
+        ("depth", "Depth", "Is the depth true?", drawn(depth)),
         (
             "camera",
             "Camera",
             "Is the camera what the factory says?",
-            camera.into_iter().flatten().collect(),
+            drawn(camera.into_iter().flatten()),
         ),
-        (
-            "trust",
-            "Trust",
-            "Can the measurement be trusted?",
-            trust.into_iter().flatten().collect(),
-        ),
+        ("trust", "Trust", "Can the measurement be trusted?", drawn(trust.into_iter().flatten())),
     ]
+}
+
+fn drawn(figures: impl Iterator<Item = Figure>) -> Vec<Markup> {
+    figures.map(|figure| figure.to_html()).collect()
 }
 
 fn header(audit: &Audit, parts: &[(&str, &str)]) -> Markup {
