@@ -12,14 +12,12 @@
 
 use std::collections::BTreeMap;
 
-use super::simd::{dot, vectorized};
+use super::simd::vectorized;
 
 /// Reach of the blur's kernel, bits to each side.
 const REACH: i32 = 3;
 /// Unknowns of the blur: its kernel and a constant.
 const TAPS: usize = 50;
-/// The same, filled up to whole vectors.
-const PADDED: usize = 56;
 /// Cells that a blurred reading takes in at most: as many as a mask has bits.
 pub(super) const MOST_CELLS: usize = 64;
 /// Pairs of a placement and a cell at most: about a tenth of a second.
@@ -244,53 +242,108 @@ impl BlurFit {
 
     /// −ln of the mean squared residual.
     fn score(self) -> f64 {
-        let Some(root) = root(&self.normal, self.n_samples) else { return f64::NEG_INFINITY };
-        let explained = explained(&root, &self.right);
+        let Some(explained) = Elimination::new(&self.normal, self.n_samples).explained(&self.right)
+        else {
+            return f64::NEG_INFINITY;
+        };
         let residual = (self.energy - explained).max(1e-6 * self.energy);
         -(residual / self.n_samples).ln()
     }
 }
 
-/// Lower triangular L with L Lᵀ = N, with a ridge for so many samples; `None` where N is not positive.
-fn root(normal: &Normal, n_samples: f64) -> Option<Box<[f64; TRIANGLE]>> {
-    vectorized(
-        #[inline(always)]
-        || decompose(normal, n_samples),
-    )
+/// Numbers in a row of an [`Elimination`]: a whole number of vectors.
+const STRIDE: usize = 56;
+/// A normal matrix on the way to U with Uᵀ D⁻¹ U = N, D being the diagonal of U: Gauss' elimination, rows on and right
+/// of the diagonal. What lies left of it is of no meaning. The right-hand side may ride along in the last column.
+#[derive(Clone, Debug)]
+struct Elimination {
+    rows: Box<[Row; TAPS]>,
 }
 
-#[inline(always)]
-fn decompose(normal: &Normal, n_samples: f64) -> Option<Box<[f64; TRIANGLE]>> {
-    let mut root = Box::new(normal.map(f64::from));
-    let start = |row: usize| row * (row + 1) / 2;
-    for i in 0..TAPS {
-        let (above, here) = root.split_at_mut(start(i));
-        for j in 0..i {
-            let sum = dot(&here[..j], &above[start(j)..][..j]);
-            here[j] = (here[j] - sum) / above[start(j) + j];
+/// A row of an [`Elimination`], where vectors do not straddle lines of the cache.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+struct Row([f64; STRIDE]);
+
+impl Elimination {
+    /// N with a ridge for so many samples.
+    fn new(normal: &Normal, n_samples: f64) -> Self {
+        let mut rows = Box::new([Row([0.0; STRIDE]); TAPS]);
+        let mut rest = &normal[..];
+        for i in 0..TAPS {
+            let (row, after) = rest.split_at(i + 1);
+            for (j, entry) in row.iter().enumerate() {
+                rows[j].0[i] = f64::from(*entry);
+            }
+            rows[i].0[i] += 1e-3 * n_samples;
+            rest = after;
         }
-        let pivot = here[i] + 1e-3 * n_samples - dot(&here[..i], &here[..i]);
-        if !(pivot > 0.0) {
-            return None;
+        Self { rows }
+    }
+
+    /// The energy bᵀ N⁻¹ b that the fit explains; `None` where N is not positive.
+    fn explained(mut self, right: &[f64; TAPS]) -> Option<f64> {
+        for (row, b) in self.rows.iter_mut().zip(right) {
+            row.0[TAPS] = *b;
         }
-        here[i] = pivot.sqrt();
+        self.eliminate()?;
+        Some(self.rows.iter().enumerate().map(|(k, Row(row))| row[TAPS] * row[TAPS] / row[k]).sum())
     }
-    Some(root)
-}
 
-/// The energy bᵀ N⁻¹ b = |y|² that the fit explains, L y = b.
-fn explained(root: &[f64; TRIANGLE], right: &[f64; TAPS]) -> f64 {
-    let mut y = [0.0; TAPS];
-    for i in 0..TAPS {
-        let row = &root[i * (i + 1) / 2..][..=i];
-        let sum = dot(&row[..i], &y[..i]);
-        y[i] = (right[i] - sum) / row[i];
+    /// Makes this U; `None` where N is not positive.
+    fn eliminate(&mut self) -> Option<()> {
+        vectorized(
+            #[inline(always)]
+            || self.eliminate_pairs(),
+        )
     }
-    y.iter().map(|v| v * v).sum()
-}
 
-fn padded(taps: &[f32; TAPS]) -> [f32; PADDED] {
-    std::array::from_fn(|k| taps.get(k).copied().unwrap_or(0.0))
+    /// Two rows at a time: what lies below is loaded and stored half as often.
+    #[inline(always)]
+    fn eliminate_pairs(&mut self) -> Option<()> {
+        const { assert!(TAPS.is_multiple_of(2)) };
+        for k in (0..TAPS).step_by(2) {
+            let (above, below) = self.rows.split_at_mut(k + 2);
+            let [.., Row(first), Row(second)] = above else { return None };
+            let pivot = first[k];
+            if !(pivot > 0.0) {
+                return None;
+            }
+            let part = first[k + 1] / pivot;
+            for (to, from) in second.iter_mut().zip(&*first) {
+                *to -= part * from;
+            }
+            let second_pivot = second[k + 1];
+            if !(second_pivot > 0.0) {
+                return None;
+            }
+            let (over, second_over) = (1.0 / pivot, 1.0 / second_pivot);
+            for (i, Row(row)) in (k + 2..).zip(below) {
+                let (a, b) = (first[i] * over, second[i] * second_over);
+                // Whole rows: their length is known when this is compiled.
+                for j in 0..STRIDE {
+                    row[j] -= a * first[j] + b * second[j];
+                }
+            }
+        }
+        Some(())
+    }
+
+    /// The energy bᵀ N⁻¹ b, where this is U already.
+    #[inline(always)]
+    fn energy(&self, right: &[f64; TAPS]) -> f64 {
+        let mut rest = [0.0; STRIDE];
+        rest[..TAPS].copy_from_slice(right);
+        let mut energy = 0.0;
+        for (k, Row(row)) in self.rows.iter().enumerate() {
+            let part = rest[k] / row[k];
+            energy += part * rest[k];
+            for j in 0..STRIDE {
+                rest[j] -= part * row[j];
+            }
+        }
+        energy
+    }
 }
 
 /// Adds the outer product of the taps with themselves.
@@ -306,15 +359,22 @@ fn add_products(normal: &mut Normal, taps: &[f32; TAPS]) {
     }
 }
 
-/// The expected markers, and last the mean of all, shifted by every tap of the kernel.
+/// Columns of a kernel and the constant: a row of taps is one vector.
+const TAP_COLUMNS: usize = 2 * REACH as usize + 2;
+/// Taps of a kernel with a constant beside every row.
+const PADDED: usize = TAP_COLUMNS * (2 * REACH as usize + 1);
+
+/// The expected markers, and last the mean of all, ready for a kernel.
 #[derive(Clone, Debug)]
 pub(super) struct BlurModel {
-    /// For each marker, sample and tap: the expected value.
-    shifted: Vec<[f32; PADDED]>,
+    /// For each marker, column and row what a row of the kernel's taps meets there, and 1 for the constant; rows begin
+    /// [`REACH`] above the marker. What the whole kernel meets at a sample lies in one piece.
+    patterns: Vec<f32>,
     /// For each marker the normal matrix of its samples.
     normals: Vec<Normal>,
-    /// Root of the mean of the markers' normal matrices.
-    mean_root: Box<[f64; TRIANGLE]>,
+    /// Of the mean of the markers' normal matrices.
+    mean: Elimination,
+    size: usize,
     n2: usize,
 }
 
@@ -330,75 +390,98 @@ impl BlurModel {
     #[inline(always)]
     fn build(size: usize, codes: &[f32]) -> Self {
         let n2 = size * size;
-        let (size, n_used) = (size as i32, codes.len() / n2);
-        let mut shifted = Vec::with_capacity((n_used + 1) * n2);
-        let mut normals = Vec::with_capacity(n_used + 1);
+        let n_used = codes.len() / n2;
+        let rows = size + 2 * REACH as usize;
+        let length = size * rows * TAP_COLUMNS;
+        let mut patterns = Vec::with_capacity((n_used + 1) * length);
         for id in 0..n_used {
-            let mut normal = [0.0; TRIANGLE];
-            for row in 0..size {
-                for column in 0..size {
-                    let mut taps = [1.0_f32; TAPS];
-                    let offsets =
-                        (-REACH..=REACH).flat_map(|dy| (-REACH..=REACH).map(move |dx| (dx, dy)));
-                    for (tap, (dx, dy)) in taps.iter_mut().zip(offsets) {
-                        let (r, c) = (row + dy, column + dx);
-                        // Round the marker lies the white rim of its square.
-                        *tap = if (0..size).contains(&r) && (0..size).contains(&c) {
-                            codes[id * n2 + (r * size + c) as usize]
-                        } else {
-                            1.0
-                        };
+            for column in 0..size {
+                for row in 0..rows {
+                    // Round the marker lies the white rim of its square.
+                    let mut taps = [1.0; TAP_COLUMNS];
+                    for (k, tap) in taps[..TAP_COLUMNS - 1].iter_mut().enumerate() {
+                        // What is negative becomes larger than any marker.
+                        let reach = REACH as usize;
+                        let (r, c) = (row.wrapping_sub(reach), (column + k).wrapping_sub(reach));
+                        if r < size && c < size {
+                            *tap = codes[id * n2 + r * size + c];
+                        }
                     }
-                    add_products(&mut normal, &taps);
-                    shifted.push(padded(&taps));
+                    patterns.extend(taps);
                 }
             }
-            normals.push(normal);
         }
         // The mean marker.
-        let mut normal = [0.0; TRIANGLE];
-        for sample in 0..n2 {
-            let mut mean = [0.0_f32; TAPS];
-            for id in 0..n_used {
-                let row: &[f32; PADDED] = &shifted[id * n2 + sample];
-                for (m, t) in mean.iter_mut().zip(row) {
-                    *m += t / n_used as f32;
-                }
-            }
-            add_products(&mut normal, &mean);
-            shifted.push(padded(&mean));
+        for place in 0..length {
+            let sum: f32 = (0..n_used).map(|id| patterns[id * length + place]).sum();
+            patterns.push(sum / n_used as f32);
         }
+        let normals: Vec<Normal> = (0..=n_used)
+            .map(|id| {
+                let mut normal = [0.0; TRIANGLE];
+                for column in 0..size {
+                    for row in 0..size {
+                        let at = ((id * size + column) * rows + row) * TAP_COLUMNS;
+                        let met = patterns[at..].first_chunk().expect("rows enough");
+                        add_products(&mut normal, &kernel(met));
+                    }
+                }
+                normal
+            })
+            .collect();
         let mut sum = [0.0; TRIANGLE];
-        for normal in &normals {
+        for normal in &normals[..n_used] {
             for (sum, part) in sum.iter_mut().zip(normal) {
                 *sum += part / n_used as f32;
             }
         }
-        normals.push(normal);
-        let mean_root = root(&sum, n2 as f64).expect("a sum of squares and a ridge");
-        Self { shifted, normals, mean_root, n2 }
+        let mut mean = Elimination::new(&sum, n2 as f64);
+        mean.eliminate().expect("a sum of squares and a ridge");
+        Self { patterns, normals, mean, size, n2 }
     }
 
     /// Energy explained per marker, were every marker's normal matrix the mean of all, times the number of markers.
     fn explained_by_mean(&self, right: &[f64; TAPS]) -> f64 {
-        explained(&self.mean_root, right)
+        vectorized(
+            #[inline(always)]
+            || self.mean.energy(right),
+        )
     }
 
     /// Σ over the samples of value · expected, for each tap.
     fn correlate(&self, id: usize, samples: &[f32]) -> [f32; TAPS] {
-        let rows = &self.shifted[id * self.n2..][..self.n2];
-        let sums = vectorized(
+        vectorized(
             #[inline(always)]
-            || {
-                let mut sums = [0.0_f32; PADDED];
-                for (v, row) in samples.iter().zip(rows) {
-                    for k in 0..PADDED {
-                        sums[k] += v * row[k];
-                    }
-                }
-                sums
-            },
-        );
-        std::array::from_fn(|tap| sums[tap])
+            || self.correlate_rows(id, samples),
+        )
     }
+
+    #[inline(always)]
+    fn correlate_rows(&self, id: usize, samples: &[f32]) -> [f32; TAPS] {
+        let column_length = (self.size + 2 * REACH as usize) * TAP_COLUMNS;
+        let pattern = &self.patterns[id * self.size * column_length..];
+        let mut sums = [0.0_f32; PADDED];
+        for (column, pattern) in pattern.chunks_exact(column_length).take(self.size).enumerate() {
+            for row in 0..self.size {
+                let value = samples[row * self.size + column];
+                let met: &[f32; PADDED] =
+                    pattern[row * TAP_COLUMNS..].first_chunk().expect("rows enough");
+                for k in 0..PADDED {
+                    sums[k] += value * met[k];
+                }
+            }
+        }
+        kernel(&sums)
+    }
+}
+
+/// The taps of a kernel, row by row, and last the constant, from rows that have the constant each.
+#[inline(always)]
+fn kernel(padded: &[f32; PADDED]) -> [f32; TAPS] {
+    let mut taps = [padded[TAP_COLUMNS - 1]; TAPS];
+    let rows = padded.as_chunks::<TAP_COLUMNS>().0;
+    for (taps, row) in taps.chunks_exact_mut(TAP_COLUMNS - 1).zip(rows) {
+        taps.copy_from_slice(&row[..TAP_COLUMNS - 1]);
+    }
+    taps
 }

@@ -305,13 +305,13 @@ pub(super) fn most_saddles(level: &Level) -> usize {
 }
 
 /// Blocks to try, best guess first. Below 2560 pixels across, squares of 12 to 150 pixels are seen at half resolution,
-/// smaller ones at full, larger ones on a coarser level. In larger images squares have more pixels, too: they begin
-/// coarser, and full resolution, which costs most, comes last.
+/// larger or blurred ones on a coarser level, smaller ones at full. In larger images squares have more pixels, too: they
+/// begin coarser. Finer levels, which cost most, come last.
 pub(super) fn factors(image: &Gray) -> Vec<usize> {
     let (width, height) = (image.width(), image.height());
     let first = 2 * (width.max(height) / 1280).max(1);
     let first = 1 << first.ilog2();
-    let mut factors = if first == 2 { vec![2, 1, 3] } else { vec![first] };
+    let mut factors = if first == 2 { vec![2, 3] } else { vec![first] };
     let mut factor = 4;
     while width.min(height) / factor >= COARSEST {
         if factor != first {
@@ -320,8 +320,9 @@ pub(super) fn factors(image: &Gray) -> Vec<usize> {
         factor *= 2;
     }
     if first != 2 {
-        factors.extend([2, 1]);
+        factors.push(2);
     }
+    factors.push(1);
     factors
 }
 

@@ -340,7 +340,9 @@ impl Expected {
         let bright = cells(&self.board, image, lattice, map, true);
         let dark = || cells(&self.board, image, lattice, map, false);
         self.by_blurred_bits(lattice, &bright).or_else(|why| {
-            self.best_by_blur(lattice, &bright)
+            // As with bits: mirrored placements only where no straight one convinces.
+            self.best_by_blur(lattice, &bright, 0..4)
+                .or_else(|_| self.best_by_blur(lattice, &bright, 0..8))
                 .or_else(|_| self.by_blurred_bits(lattice, &dark()))
                 .map_err(|_| why)
         })
@@ -483,7 +485,12 @@ impl Expected {
     }
 
     /// The placement that, under a blur of its own, leaves the least of the picture unexplained.
-    fn best_by_blur(&self, lattice: &Lattice, cells: &[Cell]) -> Result<Identified, NotIdentified> {
+    fn best_by_blur(
+        &self,
+        lattice: &Lattice,
+        cells: &[Cell],
+        turns: Range<usize>,
+    ) -> Result<Identified, NotIdentified> {
         if cells.len() < 4 {
             return Err(NotIdentified::Ambiguous); // Too few samples for a kernel.
         }
@@ -491,12 +498,13 @@ impl Expected {
         // left alone.
         let step = cells.len().div_ceil(MOST_CELLS);
         let cells: Vec<Cell> = cells.iter().step_by(step).cloned().collect();
-        let candidates = self.placements(lattice, &cells, 0..8, BLURRED_INSIDE);
+        let candidates = self.placements(lattice, &cells, turns.clone(), BLURRED_INSIDE);
         if candidates.len() * cells.len() > MOST_TRIALS {
             return Err(NotIdentified::Ambiguous);
         }
         let half = lattice.contrast as f32 / 2.0;
-        let values = self.turned(&cells, 0..8, |cell, k| (cell.samples[k] - cell.rim) / half + 1.0);
+        let values =
+            self.turned(&cells, turns, |cell, k| (cell.samples[k] - cell.rim) / half + 1.0);
         let entrants: Vec<Entrant> = candidates
             .iter()
             .map(|candidate| {

@@ -156,22 +156,9 @@ fn links(level: &Level, saddles: &[Saddle]) -> Vec<[Link; 4]> {
     let mut one_way: Vec<[Link; 4]> = vec![[None; 4]; saddles.len()];
     let mut near: [Vec<Near>; 4] = Default::default();
     for (p, links) in one_way.iter_mut().enumerate() {
-        // Rings of buckets outward until every edge has its neighbour, to 64 pixels at least: larger squares are found
-        // on a coarser level.
-        for reach in [1, 2, 4] {
-            let open = [0, 1, 2, 3].map(|k| links[k].is_none());
-            grid.near(saddles, p, reach, open, &mut near);
-            for k in 0..4 {
-                if open[k] {
-                    let near = &mut near[k];
-                    near.sort_unstable_by(|a, b| a.square.total_cmp(&b.square).then(a.q.cmp(&b.q)));
-                    near.truncate(MOST_TRIED);
-                    links[k] = near.iter().find_map(|n| neighbour(level, saddles, p, k, n));
-                }
-            }
-            if links.iter().all(Option::is_some) || reach >= grid.columns.max(grid.rows) {
-                break;
-            }
+        grid.near(saddles, p, &mut near);
+        for (k, link) in links.iter_mut().enumerate() {
+            *link = nearest(&mut near[k], |n| neighbour(level, saddles, p, k, n));
         }
     }
     // Both ends must agree.
@@ -196,6 +183,19 @@ struct Near {
     offset: [f32; 2],
     /// Square of the distance.
     square: f32,
+}
+
+/// The first of the nearest [`MOST_TRIED`] that `find` takes, nearest first. Forgets what it has looked at.
+fn nearest<T>(near: &mut Vec<Near>, mut find: impl FnMut(&Near) -> Option<T>) -> Option<T> {
+    for _ in 0..MOST_TRIED {
+        // Equals by number: the order must not depend on where the search began.
+        let order = |a: &Near, b: &Near| a.square.total_cmp(&b.square).then(a.q.cmp(&b.q));
+        let (at, _) = near.iter().enumerate().min_by(|a, b| order(a.1, b.1))?;
+        if let Some(found) = find(&near.swap_remove(at)) {
+            return Some(found);
+        }
+    }
+    None
 }
 
 /// The link along edge `k` of `p` to a saddle in that direction, if it can be its neighbour.
@@ -283,8 +283,9 @@ struct Buckets {
     flags: Vec<u8>,
 }
 
-/// Side of a bucket, pixels of the level.
-const BUCKET: f32 = 16.0;
+/// Side of a bucket, pixels of the level: neighbours are at most this far apart for certain. Larger squares are found on
+/// a coarser level.
+const BUCKET: f32 = 64.0;
 
 impl Buckets {
     fn new(level: &Level, saddles: &[Saddle]) -> Self {
@@ -331,22 +332,15 @@ impl Buckets {
         (column, ((s.y.max(0.0) / BUCKET) as usize).min(self.rows - 1))
     }
 
-    /// The saddles within `reach` buckets of `p` that lie in the direction of its edges, for those that are open.
+    /// For each edge of `p` the saddles in its direction, in the same bucket and those around it.
     #[inline(always)]
-    fn near(
-        &mut self,
-        saddles: &[Saddle],
-        p: usize,
-        reach: usize,
-        open: [bool; 4],
-        out: &mut [Vec<Near>; 4],
-    ) {
+    fn near(&mut self, saddles: &[Saddle], p: usize, out: &mut [Vec<Near>; 4]) {
         out.iter_mut().for_each(Vec::clear);
         let here = &saddles[p];
         let (column, row) = self.place(here);
-        for r in row.saturating_sub(reach)..=(row + reach).min(self.rows - 1) {
-            let first = self.starts[r * self.columns + column.saturating_sub(reach)] as usize;
-            let last = (column + reach).min(self.columns - 1);
+        for r in row.saturating_sub(1)..=(row + 1).min(self.rows - 1) {
+            let first = self.starts[r * self.columns + column.saturating_sub(1)] as usize;
+            let last = (column + 1).min(self.columns - 1);
             let end = self.starts[r * self.columns + last + 1] as usize;
             let (x, y) = (&self.x[first..end], &self.y[first..end]);
             self.flags.clear();
@@ -361,9 +355,9 @@ impl Buckets {
                     let (dx, dy) = (x[i] - here.x, y[i] - here.y);
                     let q = self.members[first + i];
                     let near = Near { q, offset: [dx, dy], square: dx * dx + dy * dy };
-                    for k in 0..4 {
-                        if open[k] && flag >> k & 1 == 1 {
-                            out[k].push(near);
+                    for (k, out) in out.iter_mut().enumerate() {
+                        if flag >> k & 1 == 1 {
+                            out.push(near);
                         }
                     }
                 }

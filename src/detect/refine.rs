@@ -19,11 +19,7 @@ use std::array;
 
 use crate::{geom::Pixel, image::Gray};
 
-use super::{
-    map::length,
-    pyramid::Level,
-    simd::{dot, vectorized},
-};
+use super::{map::length, pyramid::Level, simd::vectorized};
 
 /// A corner to refine.
 #[derive(Clone, Copy, Debug)]
@@ -361,7 +357,7 @@ impl Cross {
 }
 
 /// Pixels handled at a time.
-const LANES: usize = 8;
+const LANES: usize = 16;
 /// Gradients in a row of a sharp corner's window.
 const SHARP_COLUMNS: usize = 16;
 
@@ -380,8 +376,8 @@ pub(super) struct Window {
     gy: Vec<f32>,
     /// Smoothed pixels, then the influences of gradients: memory only.
     work: Vec<f32>,
-    /// Influences of smoothed pixels: memory only.
-    smooth: Vec<f32>,
+    /// A row of influences of raw pixels in the making: memory only.
+    rows_of_raw: Vec<f32>,
     column: Vec<u16>,
 }
 
@@ -460,8 +456,9 @@ impl Window {
                     .map(|y| image.row(y)[x0 - 1..].first_chunk().expect("the caller has looked"));
             let column: [u16; 2 * N] =
                 array::from_fn(|i| u16::from(a[i]) + 2 * u16::from(b[i]) + u16::from(c[i]));
-            let mut out = [0.0_f32; N + LANES];
-            for i in 0..N + LANES {
+            // One more than gradients, and what fills the vector up.
+            let mut out = [0.0_f32; N + 8];
+            for i in 0..N + 8 {
                 let sum = column[i] + 2 * column[i + 1] + column[i + 2];
                 out[i] = f32::from(sum) * (1.0 / 16.0);
             }
@@ -487,12 +484,37 @@ impl Window {
     /// The sums Σ w g gᵀ(p − q), and how fast they fall as q moves; `None` where no two edges cross.
     #[inline(always)]
     fn slope(&self, cross: &Cross, q: [f64; 2]) -> Option<(Slope, [f64; 2])> {
+        // The width of most windows is known when this is compiled.
+        let sums = match self.stride {
+            SHARP_COLUMNS => self.slope_sums(cross, q, SHARP_COLUMNS),
+            stride => self.slope_sums(cross, q, stride),
+        };
+        let [a, b, c, rx, ry, xa, xb, ya, yb] = sums;
+        let det = a * c - b * b;
+        // Two edges of different directions: the smaller eigenvalue is a fair part of the larger.
+        if !(det > 0.02 * (a + c) * (a + c) / 4.0) {
+            return None;
+        }
+        // The slope of the weight in pixels: its slope per square times the inverse of the axes.
+        let [u, v] = cross.inverse.map(|row| row.map(f64::from));
+        let moving = Slope([
+            [a + xa * u[0] + xb * v[0], b + xa * u[1] + xb * v[1]],
+            [b + ya * u[0] + yb * v[0], c + ya * u[1] + yb * v[1]],
+        ]);
+        let falls = moving.0[0][0] + moving.0[1][1] > 0.0 && moving.det() > MIN_SLOPE * det;
+        let slope = if falls { moving } else { Slope([[a, b], [b, c]]) };
+        Some((slope, [rx, ry]))
+    }
+
+    /// The triangle of Σ w g gᵀ, Σ w g (gᵀr), and Σ g (gᵀr)·(∇w)ᵀ with the slope of the weight along the board's axes.
+    #[inline(always)]
+    fn slope_sums(&self, cross: &Cross, q: [f64; 2], stride: usize) -> [f64; 9] {
         let mut sums = [[0.0_f32; LANES]; 9];
         let first_dx = (self.x0 - q[0]) as f32;
         for y in 0..self.rows {
             let dy = (self.y0 + y as f64 - q[1]) as f32;
-            let gx = self.gx[y * self.stride..][..self.stride].as_chunks::<LANES>().0;
-            let gy = self.gy[y * self.stride..][..self.stride].as_chunks::<LANES>().0;
+            let gx = self.gx[y * stride..][..stride].as_chunks::<LANES>().0;
+            let gy = self.gy[y * stride..][..stride].as_chunks::<LANES>().0;
             let mut dx0 = first_dx;
             for (gx, gy) in gx.iter().zip(gy) {
                 for k in 0..LANES {
@@ -514,32 +536,26 @@ impl Window {
                 dx0 += LANES as f32;
             }
         }
-        let [a, b, c, rx, ry, xa, xb, ya, yb] = sums.map(sum);
-        let det = a * c - b * b;
-        // Two edges of different directions: the smaller eigenvalue is a fair part of the larger.
-        if !(det > 0.02 * (a + c) * (a + c) / 4.0) {
-            return None;
-        }
-        // The slope of the weight in pixels: its slope per square times the inverse of the axes.
-        let [u, v] = cross.inverse.map(|row| row.map(f64::from));
-        let moving = Slope([
-            [a + xa * u[0] + xb * v[0], b + xa * u[1] + xb * v[1]],
-            [b + ya * u[0] + yb * v[0], c + ya * u[1] + yb * v[1]],
-        ]);
-        let falls = moving.0[0][0] + moving.0[1][1] > 0.0 && moving.det() > MIN_SLOPE * det;
-        let slope = if falls { moving } else { Slope([[a, b], [b, c]]) };
-        Some((slope, [rx, ry]))
+        sums.map(sum)
     }
 
     /// The sums Σ w g gᵀ(p − q) alone.
     #[inline(always)]
     fn pull(&self, cross: &Cross, q: [f64; 2]) -> [f64; 2] {
+        match self.stride {
+            SHARP_COLUMNS => self.pull_sums(cross, q, SHARP_COLUMNS),
+            stride => self.pull_sums(cross, q, stride),
+        }
+    }
+
+    #[inline(always)]
+    fn pull_sums(&self, cross: &Cross, q: [f64; 2], stride: usize) -> [f64; 2] {
         let mut sums = [[0.0_f32; LANES]; 2];
         let first_dx = (self.x0 - q[0]) as f32;
         for y in 0..self.rows {
             let dy = (self.y0 + y as f64 - q[1]) as f32;
-            let gx = self.gx[y * self.stride..][..self.stride].as_chunks::<LANES>().0;
-            let gy = self.gy[y * self.stride..][..self.stride].as_chunks::<LANES>().0;
+            let gx = self.gx[y * stride..][..stride].as_chunks::<LANES>().0;
+            let gy = self.gy[y * stride..][..stride].as_chunks::<LANES>().0;
             let mut dx0 = first_dx;
             for (gx, gy) in gx.iter().zip(gy) {
                 for k in 0..LANES {
@@ -557,61 +573,81 @@ impl Window {
     /// Standard deviation per coordinate, pixels per grey level of noise.
     ///
     /// The derivative of Σ w g (gᵀr) by one gradient is w·((gᵀr)·1 + g·rᵀ), and K⁻¹ takes it to the corner. A gradient
-    /// is half a difference of 2 × 2 smoothed pixels, so the influence of a smoothed pixel is half the sum, with the
-    /// signs of its place, of those of the four gradients it takes part in; smoothing by (1 2 1)/4 along both axes
-    /// spreads it over the raw pixels.
+    /// is half a difference of 2 × 2 smoothed pixels, and those are (1 2 1)/4 of the raw ones along both axes. Together
+    /// a gradient along one axis is (−1 −1 1 1) along that and (1 3 3 1) along the other, over 32.
     #[inline(always)]
     fn sigma(&mut self, cross: &Cross, slope: &Slope, q: [f64; 2]) -> f64 {
-        // Planes with two rows and columns of zeros before the influences and three after them, which take what
-        // spreads: what runs over the end of a row meets the zeros of the next.
-        let n = self.stride + 5;
-        let size = n * (self.rows + 5);
-        self.work.clear();
+        let covariance = match self.stride {
+            SHARP_COLUMNS => self.raw_covariance(cross, q, SHARP_COLUMNS),
+            stride => self.raw_covariance(cross, q, stride),
+        };
+        (0.5 * slope.covariance_trace(covariance)).sqrt() / 32.0
+    }
+
+    /// Σ over the raw pixels of the products of their influences on both sums, times 32².
+    #[inline(always)]
+    fn raw_covariance(&mut self, cross: &Cross, q: [f64; 2], stride: usize) -> [f64; 3] {
+        // Influences of the gradients: for each of both sums that of gx and that of gy, in planes with three rows of
+        // zeros before and after.
+        let size = (self.rows + 6) * stride;
         self.work.resize(4 * size, 0.0);
-        self.smooth.resize(2 * size, 0.0);
-        // Influence on both sums, of gx plus gy and of gx minus gy.
-        let (sums, differences) = self.work.split_at_mut(2 * size);
-        let ([sum_x, sum_y], [difference_x, difference_y]) =
-            (halves(sums, size), halves(differences, size));
+        let planes = quarters(&mut self.work, size);
+        let [of_gx_on_x, of_gy_on_x, of_gx_on_y, of_gy_on_y] = planes;
+        let (before, after) = (3 * stride, (self.rows + 3) * stride);
+        for plane in [&mut *of_gx_on_x, of_gy_on_x, of_gx_on_y, of_gy_on_y] {
+            plane[..before].fill(0.0);
+            plane[after..].fill(0.0);
+        }
+        // Whole vectors at a time, by way of arrays: the compiler need not mind that planes might overlap.
         let first_dx = (self.x0 - q[0]) as f32;
         for y in 0..self.rows {
             let dy = (self.y0 + y as f64 - q[1]) as f32;
-            let (at, n) = ((y + 2) * n + 2, self.stride);
-            let gx = &self.gx[y * n..][..n];
-            let gy = &self.gy[y * n..][..n];
-            let (sum_x, sum_y) = (&mut sum_x[at..][..n], &mut sum_y[at..][..n]);
-            let difference_x = &mut difference_x[at..][..n];
-            let difference_y = &mut difference_y[at..][..n];
-            for x in 0..n {
-                let dx = first_dx + x as i32 as f32;
-                let w = cross.weight(dx, dy);
-                let (gx, gy) = (gx[x], gy[x]);
-                let along = gx * dx + gy * dy;
-                let (of_gx, of_gy) = (w * (along + gx * dx), w * (gx * dy));
-                (sum_x[x], difference_x[x]) = (of_gx + of_gy, of_gx - of_gy);
-                let (of_gx, of_gy) = (w * (gy * dx), w * (along + gy * dy));
-                (sum_y[x], difference_y[x]) = (of_gx + of_gy, of_gx - of_gy);
+            for x in (0..stride).step_by(LANES) {
+                let (gx, gy) = (lanes(&self.gx, y * stride + x), lanes(&self.gy, y * stride + x));
+                let mut on = [[0.0; LANES]; 4];
+                for i in 0..LANES {
+                    let dx = first_dx + (x + i) as i32 as f32;
+                    let w = cross.weight(dx, dy);
+                    let (gx, gy) = (w * gx[i], w * gy[i]);
+                    let along = gx * dx + gy * dy;
+                    on[0][i] = along + gx * dx;
+                    on[1][i] = gx * dy;
+                    on[2][i] = gy * dx;
+                    on[3][i] = along + gy * dy;
+                }
+                let at = (y + 3) * stride + x;
+                of_gx_on_x[at..][..LANES].copy_from_slice(&on[0]);
+                of_gy_on_x[at..][..LANES].copy_from_slice(&on[1]);
+                of_gx_on_y[at..][..LANES].copy_from_slice(&on[2]);
+                of_gy_on_y[at..][..LANES].copy_from_slice(&on[3]);
             }
         }
-        let [smooth_x, smooth_y] = halves(&mut self.smooth, size);
-        spread(sum_x, difference_x, smooth_x, n);
-        spread(sum_y, difference_y, smooth_y, n);
-        // Raw pixels: (1 2 1) along y and then along x, each into the planes that are free again. What a pixel and the
-        // one below it do is alike after this much smoothing: every second row stands for two.
-        let rows = (self.rows + 3).div_ceil(2);
-        for y in 0..rows {
-            let (at, from) = (y * n, 2 * y * n);
-            one_two_one(&smooth_x[from..], &mut difference_x[at..][..n], n);
-            one_two_one(&smooth_y[from..], &mut difference_y[at..][..n], n);
+        // Raw pixels, row by row: first along y, which needs no shift, then along x. What a pixel and the one below it
+        // do is alike after this much smoothing: every second row stands for two.
+        let wide = stride + LANES;
+        self.rows_of_raw.clear();
+        self.rows_of_raw.resize(4 * (wide + 3), 0.0);
+        let [a_x, b_x, a_y, b_y] = quarters(&mut self.rows_of_raw, wide + 3);
+        let mut sums = [[0.0_f32; LANES]; 3];
+        for row in (0..self.rows + 3).step_by(2) {
+            for x in (0..stride).step_by(LANES) {
+                let at = row * stride + x;
+                let to = x + 3..x + 3 + LANES;
+                a_x[to.clone()].copy_from_slice(&one_three_three_one(four(of_gx_on_x, at, stride)));
+                a_y[to.clone()].copy_from_slice(&one_three_three_one(four(of_gx_on_y, at, stride)));
+                b_x[to.clone()].copy_from_slice(&one_one_minus_minus(four(of_gy_on_x, at, stride)));
+                b_y[to].copy_from_slice(&one_one_minus_minus(four(of_gy_on_y, at, stride)));
+            }
+            for first in (0..wide).step_by(LANES) {
+                let (x, y) = (along_row(a_x, b_x, first), along_row(a_y, b_y, first));
+                for i in 0..LANES {
+                    sums[0][i] += x[i] * x[i];
+                    sums[1][i] += x[i] * y[i];
+                    sums[2][i] += y[i] * y[i];
+                }
+            }
         }
-        let m = n * rows;
-        one_two_one(difference_x, &mut sum_x[..m - 2], 1);
-        one_two_one(difference_y, &mut sum_y[..m - 2], 1);
-        let (of_x, of_y) = (&sum_x[..m - 2], &sum_y[..m - 2]);
-        let covariance = [dot(of_x, of_x), dot(of_x, of_y), dot(of_y, of_y)].map(f64::from);
-        let trace = slope.covariance_trace(covariance);
-        // The factors left out above: 1/2 of the gradient, 1/16 of the smoothing, two rows for one.
-        (0.5 * 2.0 * trace).sqrt() / 32.0
+        sums.map(|lanes| 2.0 * sum(lanes))
     }
 }
 
@@ -620,35 +656,54 @@ fn sum(lanes: [f32; LANES]) -> f64 {
     lanes.iter().map(|&v| f64::from(v)).sum()
 }
 
-/// Influences of smoothed pixels, without the factor 1/2, from those of the gradients: rows of `n`. The gradient at the
-/// index of a smoothed pixel lies below and to the right of it.
+/// Numbers at and after a place.
 #[inline(always)]
-fn spread(sum: &[f32], difference: &[f32], smooth: &mut [f32], n: usize) {
-    let m = sum.len() - n - 1;
-    let (zeros, out) = smooth.split_at_mut(n + 1);
-    zeros.fill(0.0);
-    let out = &mut out[..m];
-    let (above_left, above) = (&sum[..m], &difference[1..][..m]);
-    let (left, here) = (&difference[n..][..m], &sum[n + 1..][..m]);
-    for i in 0..m {
-        out[i] = (above_left[i] - here[i]) + (left[i] - above[i]);
-    }
+fn lanes(numbers: &[f32], at: usize) -> [f32; LANES] {
+    *numbers[at..].first_chunk().expect("rows are whole vectors, or end in zeros")
 }
 
-/// (1 2 1) at distances of `step`.
+/// The same in four rows one below the other, or in one row at four places one after the other.
 #[inline(always)]
-fn one_two_one(from: &[f32], to: &mut [f32], step: usize) {
-    let n = to.len();
-    let (a, b, c) = (&from[..n], &from[step..][..n], &from[2 * step..][..n]);
-    for i in 0..n {
-        to[i] = (a[i] + c[i]) + 2.0 * b[i];
-    }
+fn four(numbers: &[f32], at: usize, step: usize) -> [[f32; LANES]; 4] {
+    let [a, b, c, d] = [at, at + step, at + 2 * step, at + 3 * step];
+    [lanes(numbers, a), lanes(numbers, b), lanes(numbers, c), lanes(numbers, d)]
 }
 
-/// Both halves, of `size` each.
-fn halves(memory: &mut [f32], size: usize) -> [&mut [f32]; 2] {
-    let (first, second) = memory.split_at_mut(size);
-    [first, &mut second[..size]]
+/// Influences of raw pixels, from those of gx and gy that have been summed along y.
+#[inline(always)]
+fn along_row(of_gx: &[f32], of_gy: &[f32], at: usize) -> [f32; LANES] {
+    let across = one_one_minus_minus(four(of_gx, at, 1));
+    let mut sum = one_three_three_one(four(of_gy, at, 1));
+    for i in 0..LANES {
+        sum[i] += across[i];
+    }
+    sum
+}
+
+#[inline(always)]
+fn one_three_three_one([a, b, c, d]: [[f32; LANES]; 4]) -> [f32; LANES] {
+    let mut sum = [0.0; LANES];
+    for i in 0..LANES {
+        sum[i] = (a[i] + d[i]) + 3.0 * (b[i] + c[i]);
+    }
+    sum
+}
+
+#[inline(always)]
+fn one_one_minus_minus([a, b, c, d]: [[f32; LANES]; 4]) -> [f32; LANES] {
+    let mut sum = [0.0; LANES];
+    for i in 0..LANES {
+        sum[i] = (a[i] + b[i]) - (c[i] + d[i]);
+    }
+    sum
+}
+
+/// Four quarters, of `size` each.
+fn quarters(memory: &mut [f32], size: usize) -> [&mut [f32]; 4] {
+    let (first, rest) = memory.split_at_mut(size);
+    let (second, rest) = rest.split_at_mut(size);
+    let (third, rest) = rest.split_at_mut(size);
+    [first, second, third, &mut rest[..size]]
 }
 
 /// What rounding to 8 bits adds, grey levels: √(1/12).
@@ -663,7 +718,7 @@ fn noise_sigma(image: &Gray) -> f64 {
         return ROUNDING;
     }
     // Whole rows, evenly spread, with some thousand pixels together: the median of n is good to 1.2/√n.
-    let n_rows = (PIXELS_FOR_NOISE / width).clamp(16, height.max(16)).min(height - 2);
+    let n_rows = (PIXELS_FOR_NOISE / width).clamp(8, height.max(8)).min(height - 2);
     let mut values = vec![0_u16; width - 2];
     let mut histogram = [0_u32; 2041];
     for k in 0..n_rows {
@@ -693,7 +748,7 @@ fn noise_sigma(image: &Gray) -> f64 {
 }
 
 /// Pixels looked at for the noise, about.
-const PIXELS_FOR_NOISE: usize = 10_000;
+const PIXELS_FOR_NOISE: usize = 5_000;
 
 /// Magnitude of the response to Immerkær's kernel (1 −2 1)ᵀ(1 −2 1) for the middle one of three rows.
 #[inline(always)]

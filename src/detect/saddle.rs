@@ -89,7 +89,7 @@ pub(super) struct Memory {
 /// Rows of the response kept: a peak is told from the rows above and below.
 const KEPT_ROWS: usize = 3;
 /// Flags looked at together.
-const FLAGS: usize = 8;
+const FLAGS: usize = 32;
 
 /// The saddles of a level, strongest first, at most `most`.
 pub(super) fn saddles(level: &Level, most: usize, memory: &mut Memory) -> Vec<Saddle> {
@@ -145,10 +145,17 @@ fn find_peaks(level: &Level, memory: &mut Memory) {
         let [above, here, below] =
             [middle - 1, middle, y].map(|y| &response[y % KEPT_ROWS * width..][..width]);
         flag_peaks([above, here, below], &mut flags[margin..width - margin]);
-        for (chunk, eight) in flags.as_chunks::<FLAGS>().0.iter().enumerate() {
-            if u64::from_le_bytes(*eight) != 0 {
-                for (k, _) in eight.iter().enumerate().filter(|(_, flag)| **flag != 0) {
-                    let x = chunk * FLAGS + k;
+        for (chunk, flags) in flags.as_chunks::<FLAGS>().0.iter().enumerate() {
+            let words: [u64; FLAGS / 8] =
+                array::from_fn(|k| u64::from_le_bytes(array::from_fn(|i| flags[8 * k + i])));
+            if words.iter().fold(0, |any, word| any | word) == 0 {
+                continue;
+            }
+            for (k, mut word) in words.into_iter().enumerate() {
+                while word != 0 {
+                    // A flag is 1 in a byte of its own.
+                    let x = chunk * FLAGS + 8 * k + word.trailing_zeros() as usize / 8;
+                    word &= word - 1;
                     peaks.push((here[x], (middle * width + x) as u32));
                 }
             }

@@ -56,14 +56,11 @@ impl Gray {
         at.x >= 0.0 && at.y >= 0.0 && at.x <= right && at.y <= bottom
     }
 
-    /// As [`bilinear`](Self::bilinear), of a place that this image [`contains`](Self::contains); elsewhere what the
-    /// nearest row and column show.
+    /// As [`bilinear`](Self::bilinear), of a place that this image [`contains`](Self::contains) but for rounding;
+    /// elsewhere any grey value.
     #[inline]
     pub(crate) fn between(&self, at: Pixel) -> f32 {
-        let (right, bottom) = (self.width as f64 - 1.0, self.height as f64 - 1.0);
-        // Rounding may step over the border by less than anybody can see.
-        let ([a, b, c, d], [fx, fy]) =
-            self.around(at.x.max(0.0).min(right), at.y.max(0.0).min(bottom));
+        let ([a, b, c, d], [fx, fy]) = self.around(at.x, at.y);
         let [a, b, c, d] = [a, b, c, d].map(f32::from);
         let (fx, fy) = (fx as f32, fy as f32);
         let (top, bottom) = (a + (b - a) * fx, c + (d - c) * fx);
@@ -77,12 +74,15 @@ impl Gray {
         let (x0, y0) = (x as i32, y as i32);
         let f = [x - f64::from(x0), y - f64::from(y0)];
         let (x0, y0) = (x0 as usize, y0 as usize);
-        let at = y0 * self.width + x0;
         // On the last row or column the neighbour has weight zero: any pixel will do.
-        let right = usize::from(x0 + 1 < self.width);
-        let below = if y0 + 1 < self.height { self.width } else { 0 };
-        let p = |index: usize| self.pixels[index];
-        ([p(at), p(at + right), p(at + below), p(at + below + right)], f)
+        let at = y0 * self.width + x0;
+        let pair = |at: usize| self.pixels.get(at..)?.first_chunk::<2>();
+        if let (Some([a, b]), Some([c, d])) = (pair(at), pair(at + self.width)) {
+            return ([*a, *b, *c, *d], f);
+        }
+        let last = self.pixels.len() - 1;
+        let p = |at: usize| self.pixels[at.min(last)];
+        ([p(at), p(at + 1), p(at), p(at + 1)], f)
     }
 
     /// `N` values, at least two, at equal steps from one place to another, both included, by bilinear interpolation;
