@@ -49,13 +49,17 @@ predefined! {
 }
 
 impl Dictionary {
-    /// One of OpenCV's predefined dictionaries, by its name with or without the prefix `DICT_`, in any case.
+    /// One of OpenCV's predefined dictionaries, by its name with or without the prefixes `DICT_` and `ARUCO_`, in any
+    /// case.
     pub fn predefined(name: &str) -> Result<Self, Error> {
         let bare =
             name.strip_prefix("DICT_").or_else(|| name.strip_prefix("dict_")).unwrap_or(name);
         let (name, text, n) = PREDEFINED
             .iter()
-            .find(|(known, ..)| known.eq_ignore_ascii_case(bare))
+            .find(|(known, ..)| {
+                let short = known.strip_prefix("ARUCO_").unwrap_or(known);
+                [*known, short].iter().any(|name| name.eq_ignore_ascii_case(bare))
+            })
             .ok_or_else(|| Error::Dictionary(name.to_owned()))?;
         let mut lines = text.lines();
         let header = lines.next().expect("the tables shipped with the library have a header");
@@ -124,6 +128,9 @@ mod tests {
             assert!((0..*n).all(|i| u128::from(dictionary.code(i).unwrap()) < limit), "{name}");
         }
         assert!(Dictionary::predefined("DICT_aruco_original").is_ok());
+        for name in ["MIP_36h12", "dict_mip_36H12"] {
+            assert_eq!(Dictionary::predefined(name).unwrap().name(), "ARUCO_MIP_36h12");
+        }
         assert!(Dictionary::predefined("8X8_50").is_err());
     }
 

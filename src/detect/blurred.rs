@@ -346,17 +346,31 @@ impl Elimination {
     }
 }
 
+/// Numbers in a row of a normal matrix in the making: a whole number of vectors.
+const SQUARE: usize = 64;
+
 /// Adds the outer product of the taps with themselves.
 #[inline(always)]
-fn add_products(normal: &mut Normal, taps: &[f32; TAPS]) {
-    let mut rest = &mut normal[..];
-    for i in 0..TAPS {
-        let (row, after) = rest.split_at_mut(i + 1);
-        for (entry, tap) in row.iter_mut().zip(&taps[..=i]) {
-            *entry += taps[i] * tap;
+fn add_products(square: &mut [[f32; SQUARE]; TAPS], taps: &[f32; TAPS]) {
+    let mut padded = [0.0; SQUARE];
+    padded[..TAPS].copy_from_slice(taps);
+    for (row, tap) in square.iter_mut().zip(taps) {
+        for k in 0..SQUARE {
+            row[k] += tap * padded[k];
         }
+    }
+}
+
+/// The lower triangle of a square.
+fn triangle(square: &[[f32; SQUARE]; TAPS]) -> Normal {
+    let mut triangle = [0.0; TRIANGLE];
+    let mut rest = &mut triangle[..];
+    for (i, from) in square.iter().enumerate() {
+        let (row, after) = rest.split_at_mut(i + 1);
+        row.copy_from_slice(&from[..=i]);
         rest = after;
     }
+    triangle
 }
 
 /// Columns of a kernel and the constant: a row of taps is one vector.
@@ -418,15 +432,15 @@ impl BlurModel {
         }
         let normals: Vec<Normal> = (0..=n_used)
             .map(|id| {
-                let mut normal = [0.0; TRIANGLE];
+                let mut square = Box::new([[0.0; SQUARE]; TAPS]);
                 for column in 0..size {
                     for row in 0..size {
                         let at = ((id * size + column) * rows + row) * TAP_COLUMNS;
                         let met = patterns[at..].first_chunk().expect("rows enough");
-                        add_products(&mut normal, &kernel(met));
+                        add_products(&mut square, &kernel(met));
                     }
                 }
-                normal
+                triangle(&square)
             })
             .collect();
         let mut sum = [0.0; TRIANGLE];

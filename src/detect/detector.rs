@@ -52,7 +52,10 @@ const MOST_LATTICES: usize = 4;
 /// The shorter side of the coarsest level tried, pixels.
 const COARSEST: usize = 60;
 /// Rounds of looking for corners that the last round brought into reach.
-const MOST_PASSES: usize = 4;
+const MOST_PASSES: usize = 8;
+/// This many corners foretell others up to two squares away, fewer only their neighbours: farther off, the map may be
+/// off by a square, and a corner found there would have a wrong number.
+const MANY_CORNERS: usize = 30;
 /// A node farther than this from where the map expects it is no start for its corner, pixels.
 const MAX_START_PX: f64 = 1.0;
 /// A corner whose σ exceeds this is of no use, pixels.
@@ -116,8 +119,7 @@ impl Detector {
                 rejects.push(Reject { pixel: lattice.middle(), reason: Reason::SecondLattice });
                 continue;
             }
-            lattice.prune();
-            let Some(map) = lattice.map() else { continue };
+            let Some(map) = lattice.prune() else { continue };
             let placement = self.expected.by_bits(scales.image(), &lattice, &map).or_else(|_| {
                 let contrast = lattice.contrast;
                 // A larger lattice has more votes: look where its neighbours should be.
@@ -188,8 +190,10 @@ impl Detector {
             let Some(map) = SmoothMap::fit(&known) else { break };
             let n_before = corners.len();
             failed.clear();
+            let foretold = self.foretold(&known);
             for id in 0..board.n_corners() {
-                if corners[..n_before].binary_search_by_key(&id, |c| c.id).is_ok() {
+                if !foretold[id] || corners[..n_before].binary_search_by_key(&id, |c| c.id).is_ok()
+                {
                     continue;
                 }
                 let (x, y) = board.corner_cell(id);
@@ -213,7 +217,7 @@ impl Detector {
             }
             let n_found = corners.len() - n_before;
             corners.sort_unstable_by_key(|c| c.id);
-            if n_found == 0 || failed.is_empty() {
+            if n_found == 0 || (failed.is_empty() && foretold.iter().all(|&is| is)) {
                 break;
             }
             known = self.pairs(&corners);
@@ -231,6 +235,21 @@ impl Detector {
             return Observation { corners: Vec::new(), identity: None, rejects };
         }
         Observation { corners, identity: Some(identity), rejects }
+    }
+
+    /// For each corner of the board whether known ones are near enough to say where it is.
+    fn foretold(&self, known: &[([f64; 2], Pixel)]) -> Vec<bool> {
+        let reach = if known.len() < MANY_CORNERS { 1 } else { 2 };
+        let (columns, rows) = (self.board.squares_x - 1, self.board.squares_y - 1);
+        let mut foretold = vec![false; columns * rows];
+        for ([x, y], _) in known {
+            let (x, y) = (*x as usize, *y as usize);
+            for y in y.saturating_sub(reach)..(y + reach + 1).min(rows) {
+                let row = &mut foretold[y * columns..][..columns];
+                row[x.saturating_sub(reach)..(x + reach + 1).min(columns)].fill(true);
+            }
+        }
+        foretold
     }
 
     /// One corner near its prediction.

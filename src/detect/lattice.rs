@@ -55,11 +55,13 @@ impl Lattice {
     }
 
     /// Drops, one by one, the nodes that lie farthest from where the map through all expects them, until all lie
-    /// within a quarter of a square: a wrong link numbers everything behind it wrongly.
-    pub(super) fn prune(&mut self) {
+    /// within a quarter of a square: a wrong link numbers everything behind it wrongly. The map through what is left, as
+    /// of [`map`](Self::map).
+    pub(super) fn prune(&mut self) -> Option<SmoothMap> {
         // Small lattices hardly bend, and a bend would follow the wrong node.
+        const SMALL: usize = 36;
         let fit = |nodes: &[([f64; 2], Pixel)]| {
-            if nodes.len() < 36 { SmoothMap::homography(nodes) } else { SmoothMap::fit(nodes) }
+            if nodes.len() < SMALL { SmoothMap::homography(nodes) } else { SmoothMap::fit(nodes) }
         };
         while let Some(map) = fit(&self.pairs()) {
             let misfit = |node: &Node| {
@@ -73,9 +75,11 @@ impl Lattice {
                 self.nodes.iter().map(misfit).enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
             match worst {
                 Some((index, misfit)) if misfit > 0.25 => self.nodes.remove(index),
-                _ => return,
+                _ if self.nodes.len() < SMALL => return self.map(),
+                _ => return Some(map),
             };
         }
+        None
     }
 
     /// Where it is, for people: one of its middle nodes.

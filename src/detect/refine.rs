@@ -15,8 +15,6 @@
 //! The estimate is linear in the noise of the pixels, so its covariance follows from that of the pixels without any
 //! model of the edge: δq = K⁻¹ Σ w·((gᵀr)·1 + g·rᵀ) δg, r = p − q, with δg summed up pixel by pixel.
 
-use std::array;
-
 use crate::{geom::Pixel, image::Gray};
 
 use super::{map::length, pyramid::Level, simd::vectorized};
@@ -102,8 +100,10 @@ const MOST_STEPS: usize = 8;
 const SAME_SLOPE: f64 = 0.3;
 /// Least determinant of the slope, as a fraction of that without the motion of the weights: below, noise rules.
 const MIN_SLOPE: f64 = 0.1;
-/// What calibration targets, lenses and demosaicing leave even in a noiseless picture, pixels.
+/// What pixels that undersample a sharp edge leave even in a noiseless picture, pixels.
 const FLOOR_PX: f64 = 0.015;
+/// Width of the edges that are undersampled by so much, pixels: with wider edges it falls in proportion.
+const UNDERSAMPLED: f64 = 2.0;
 
 /// Largest factor by which a blurred picture is reduced.
 const MAX_FACTOR: usize = 6;
@@ -141,15 +141,13 @@ pub(super) fn refine(scales: &mut Scales<'_>, guess: &Guess, reach_px: f64) -> O
         ..*guess
     };
     let found = refine_at(image, window, &scaled, blur.map(|b| b / f), reach_px / f)?;
+    let floor = FLOOR_PX * (UNDERSAMPLED / blur[0].min(blur[1])).min(1.0);
     let blur_sigma = BLUR_SIGMA * (widest - SHARP).max(0.0);
     let rim_px = guess.rim * across[0].min(across[1]);
     let marker_sigma = MARKER_SIGMA * (widest / 2.0 + MIN_WIDTH - rim_px).max(0.0);
     Some(Refined {
         pixel: Pixel::new(found.pixel.x * f + offset, found.pixel.y * f + offset),
-        sigma_px: (found.sigma_px * noise * f)
-            .hypot(FLOOR_PX)
-            .hypot(blur_sigma)
-            .hypot(marker_sigma),
+        sigma_px: (found.sigma_px * noise * f).hypot(floor).hypot(blur_sigma).hypot(marker_sigma),
     })
 }
 
@@ -376,7 +374,7 @@ pub(super) struct Window {
     gy: Vec<f32>,
     /// Smoothed pixels, then the influences of gradients: memory only.
     work: Vec<f32>,
-    /// A row of influences of raw pixels in the making: memory only.
+    /// Influences on raw pixels in the making: memory only.
     rows_of_raw: Vec<f32>,
     column: Vec<u16>,
 }
@@ -449,35 +447,41 @@ impl Window {
     /// width is known when this is compiled, and rows are read a little beyond their end; weights are zero there.
     #[inline(always)]
     fn fill_sharp(&mut self, image: &Gray, x0: usize, y0: usize) {
+        // Step by step for all rows: what has just been written would have to be waited for.
         const N: usize = SHARP_COLUMNS;
-        let smooth = |y: usize| {
-            let [a, b, c]: [&[u8; 2 * N]; 3] =
-                [y.saturating_sub(1), y, (y + 1).min(image.height() - 1)]
-                    .map(|y| image.row(y)[x0 - 1..].first_chunk().expect("the caller has looked"));
-            let column: [u16; 2 * N] =
-                array::from_fn(|i| u16::from(a[i]) + 2 * u16::from(b[i]) + u16::from(c[i]));
-            // One more than gradients, and what fills the vector up.
-            let mut out = [0.0_f32; N + 8];
-            for i in 0..N + 8 {
-                let sum = column[i] + 2 * column[i + 1] + column[i + 2];
-                out[i] = f32::from(sum) * (1.0 / 16.0);
-            }
-            out
-        };
+        // One more than gradients, and what fills the vector up.
+        const M: usize = N + 8;
+        self.column.resize(2 * N * (self.rows + 1), 0);
+        self.work.resize(M * (self.rows + 1), 0.0);
         for g in [&mut self.gx, &mut self.gy] {
             g.resize(self.rows * N, 0.0);
         }
-        let mut top = smooth(y0);
+        let columns = self.column.as_chunks_mut::<{ 2 * N }>().0;
+        for (y, column) in (y0..).zip(&mut *columns) {
+            let [a, b, c]: [&[u8; 2 * N]; 3] =
+                [y.saturating_sub(1), y, (y + 1).min(image.height() - 1)]
+                    .map(|y| image.row(y)[x0 - 1..].first_chunk().expect("the caller has looked"));
+            for i in 0..2 * N {
+                column[i] = u16::from(a[i]) + 2 * u16::from(b[i]) + u16::from(c[i]);
+            }
+        }
+        let smooth = self.work.as_chunks_mut::<M>().0;
+        for (out, column) in smooth.iter_mut().zip(columns) {
+            for i in 0..M {
+                let sum = column[i] + 2 * column[i + 1] + column[i + 2];
+                out[i] = f32::from(sum) * (1.0 / 16.0);
+            }
+        }
         let (gx, gy) = (self.gx.as_chunks_mut::<N>().0, self.gy.as_chunks_mut::<N>().0);
-        for (y, (gx, gy)) in gx.iter_mut().zip(gy).enumerate() {
-            let bottom = smooth(y0 + y + 1);
+        for (([top, bottom], gx), gy) in smooth.array_windows().zip(gx).zip(gy) {
+            let (mut on_x, mut on_y) = ([0.0; N], [0.0; N]);
             for x in 0..N {
                 let (right, left) = (bottom[x + 1] - top[x], top[x + 1] - bottom[x]);
                 // Half of (t1 − t0) + (b1 − b0) and of (b0 − t0) + (b1 − t1).
-                gx[x] = 0.5 * (right + left);
-                gy[x] = 0.5 * (right - left);
+                on_x[x] = 0.5 * (right + left);
+                on_y[x] = 0.5 * (right - left);
             }
-            top = bottom;
+            (*gx, *gy) = (on_x, on_y);
         }
     }
 
@@ -624,22 +628,30 @@ impl Window {
         }
         // Raw pixels, row by row: first along y, which needs no shift, then along x. What a pixel and the one below it
         // do is alike after this much smoothing: every second row stands for two.
-        let wide = stride + LANES;
+        let wide = stride + LANES + 3;
+        let n_rows = (self.rows + 3).div_ceil(2);
         self.rows_of_raw.clear();
-        self.rows_of_raw.resize(4 * (wide + 3), 0.0);
-        let [a_x, b_x, a_y, b_y] = quarters(&mut self.rows_of_raw, wide + 3);
-        let mut sums = [[0.0_f32; LANES]; 3];
-        for row in (0..self.rows + 3).step_by(2) {
+        self.rows_of_raw.resize(4 * n_rows * wide, 0.0);
+        let [a_x, b_x, a_y, b_y] = quarters(&mut self.rows_of_raw, n_rows * wide);
+        for row in 0..n_rows {
             for x in (0..stride).step_by(LANES) {
-                let at = row * stride + x;
-                let to = x + 3..x + 3 + LANES;
-                a_x[to.clone()].copy_from_slice(&one_three_three_one(four(of_gx_on_x, at, stride)));
-                a_y[to.clone()].copy_from_slice(&one_three_three_one(four(of_gx_on_y, at, stride)));
-                b_x[to.clone()].copy_from_slice(&one_one_minus_minus(four(of_gy_on_x, at, stride)));
-                b_y[to].copy_from_slice(&one_one_minus_minus(four(of_gy_on_y, at, stride)));
+                let from = 2 * row * stride + x;
+                let to = row * wide + 3 + x;
+                a_x[to..][..LANES]
+                    .copy_from_slice(&one_three_three_one(four(of_gx_on_x, from, stride)));
+                a_y[to..][..LANES]
+                    .copy_from_slice(&one_three_three_one(four(of_gx_on_y, from, stride)));
+                b_x[to..][..LANES]
+                    .copy_from_slice(&one_one_minus_minus(four(of_gy_on_x, from, stride)));
+                b_y[to..][..LANES]
+                    .copy_from_slice(&one_one_minus_minus(four(of_gy_on_y, from, stride)));
             }
-            for first in (0..wide).step_by(LANES) {
-                let (x, y) = (along_row(a_x, b_x, first), along_row(a_y, b_y, first));
+        }
+        let mut sums = [[0.0_f32; LANES]; 3];
+        for row in 0..n_rows {
+            for x in (0..stride + LANES).step_by(LANES) {
+                let at = row * wide + x;
+                let (x, y) = (along_row(a_x, b_x, at), along_row(a_y, b_y, at));
                 for i in 0..LANES {
                     sums[0][i] += x[i] * x[i];
                     sums[1][i] += x[i] * y[i];

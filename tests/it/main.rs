@@ -6,6 +6,7 @@ mod calibrate;
 mod correct;
 mod coverage;
 mod detect;
+mod detect_any;
 mod order;
 mod photos;
 mod real_alignment;
