@@ -324,8 +324,8 @@ pub(super) fn most_saddles(level: &Level) -> usize {
 }
 
 /// Blocks to try, best guess first. Below 2560 pixels across, squares of 12 to 150 pixels are seen at half resolution,
-/// larger or blurred ones on a coarser level, smaller ones at full. In larger images squares have more pixels, too: they
-/// begin coarser. Finer levels, which cost most, come last.
+/// larger or blurred ones on a coarser level, smaller ones at full. In larger images squares have more pixels, too:
+/// they begin coarser. Finer levels, which cost most, come last.
 pub(super) fn factors(image: &Gray) -> Vec<usize> {
     let (width, height) = (image.width(), image.height());
     let first = 2 * (width.max(height) / 1280).max(1);

@@ -55,8 +55,8 @@ impl Lattice {
     }
 
     /// Drops, one by one, the nodes that lie farthest from where the map through all expects them, until all lie
-    /// within a quarter of a square: a wrong link numbers everything behind it wrongly. The map through what is left, as
-    /// of [`map`](Self::map).
+    /// within a quarter of a square: a wrong link numbers everything behind it wrongly. The map through what is left,
+    /// as of [`map`](Self::map).
     pub(super) fn prune(&mut self) -> Option<SmoothMap> {
         // Small lattices hardly bend, and a bend would follow the wrong node.
         const SMALL: usize = 36;
@@ -287,8 +287,8 @@ struct Buckets {
     flags: Vec<u8>,
 }
 
-/// Side of a bucket, pixels of the level: neighbours are at most this far apart for certain. Larger squares are found on
-/// a coarser level.
+/// Side of a bucket, pixels of the level: neighbours are at most this far apart for certain. Larger squares are found
+/// on a coarser level.
 const BUCKET: f32 = 64.0;
 
 impl Buckets {
