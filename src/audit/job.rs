@@ -194,7 +194,7 @@ pub fn audit_watched(
         place: recording.place(),
         problems: &recording.problems,
         factory: recording.factory(),
-        factories: recording.frames.iter().map(|f| f.factory.as_ref()).collect(),
+        factories: recording.frames.iter().map(|f| f.factory.as_deref()).collect(),
     };
     conclude(&ground, board, frames, options, observer)
 }

@@ -103,42 +103,44 @@ pub fn correct_observed<S: Sink>(
         }
         observer(Progress { done: batch[batch.len() - 1] + 1, total });
     }
-    let metadata = recording.amended_metadata(|timestamp| {
-        let frame = recording.frames.iter().find(|f| f.timestamp == timestamp);
-        let factory = frame.and_then(|f| f.factory.as_ref()).or(recording.factory());
+    let amendment = |timestamp| {
+        let frame = recording.frame_at(timestamp);
+        let factory = frame.and_then(|f| f.factory.as_deref()).or(recording.factory());
         Amendment {
             intrinsics: factory
                 .and_then(amended)
                 .filter(|k| factory.is_none_or(|f| f.intrinsics != *k)),
             rectified: plan.lens().is_some(),
         }
-    })?;
-    for (name, bytes) in &metadata {
-        hashes.push(hash_of(name, &recording.file(name)?));
-        sink.write(name, bytes)?;
+    };
+    for name in recording.metadata_names() {
+        hashes.push(hash_of_file(recording, name)?);
+        sink.stream(name, &mut |push| recording.amended_metadata(name, &amendment, push))?;
     }
     let mut left_out = Vec::new();
     let mut previous = None;
-    let written: std::collections::BTreeSet<String> =
-        hashes.iter().map(|hash| hash.name.clone()).collect();
+    hashes.sort_unstable_by(|a, b| a.name.cmp(&b.name));
+    let n_written = hashes.len();
     for name in recording.file_names() {
-        if written.contains(name) {
+        if hashes[..n_written].binary_search_by(|hash| hash.name.as_str().cmp(name)).is_ok() {
             continue;
         }
-        let bytes = recording.file(name)?;
-        hashes.push(hash_of(name, &bytes));
+        hashes.push(hash_of_file(recording, name)?);
         if name == PROVENANCE {
-            previous = Some(bytes);
+            previous = Some(recording.file(name)?);
         } else if recording.is_image_name(name) {
             left_out.push(name.to_owned());
         } else {
-            sink.write(name, &bytes)?;
+            sink.stream(name, &mut |push| recording.pieces(name, push))?;
         }
     }
-    hashes.sort_by(|a, b| a.name.cmp(&b.name));
-    let lines: String = hashes.iter().map(|h| format!("{}  {}\n", h.sha256, h.name)).collect();
+    hashes.sort_unstable_by(|a, b| a.name.cmp(&b.name));
+    let mut all = Sha256::new();
+    for FileHash { name, sha256 } in &hashes {
+        all.update(format!("{sha256}  {name}\n"));
+    }
     Ok(Corrected {
-        input_sha256: hash_of("", lines.as_bytes()).sha256,
+        input_sha256: hexadecimal(&all.finalize()),
         files: hashes,
         left_out,
         before: reference,
@@ -150,9 +152,20 @@ pub fn correct_observed<S: Sink>(
 }
 
 fn hash_of(name: &str, bytes: &[u8]) -> FileHash {
-    let digest = Sha256::digest(bytes);
-    let sha256 = digest.iter().map(|byte| format!("{byte:02x}")).collect();
-    FileHash { name: name.to_owned(), sha256 }
+    FileHash { name: name.to_owned(), sha256: hexadecimal(&Sha256::digest(bytes)) }
+}
+
+fn hash_of_file(recording: &Recording, name: &str) -> Result<FileHash, Error> {
+    let mut hash = Sha256::new();
+    recording.pieces(name, &mut |bytes| {
+        hash.update(bytes);
+        Ok(())
+    })?;
+    Ok(FileHash { name: name.to_owned(), sha256: hexadecimal(&hash.finalize()) })
+}
+
+fn hexadecimal(digest: &[u8]) -> String {
+    digest.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// A file to write in place of one that was read.
@@ -213,19 +226,29 @@ impl<'a> Corrector<'a> {
 
     /// The colour image of a frame, corrected.
     pub fn color(&self, index: usize) -> Result<Rgb, Error> {
-        let warps = self.warps(index)?;
-        Ok(color(self.recording.rgb(index)?, self.plan, warps.get(&self.usual)))
+        self.correct_color(index, self.recording.rgb(index)?)
     }
 
     /// The depth map of a frame, corrected.
     pub fn depth(&self, index: usize) -> Result<DepthMap, Error> {
+        self.correct_depth(index, self.recording.depth(index)?)
+    }
+
+    /// As [`color`](Self::color), for an image of the frame that is decoded already.
+    pub fn correct_color(&self, index: usize, image: Rgb) -> Result<Rgb, Error> {
         let warps = self.warps(index)?;
-        Ok(depth(self.recording.depth(index)?, self.plan, warps.get(&self.usual)))
+        Ok(color(image, self.plan, warps.get(&self.usual)))
+    }
+
+    /// As [`depth`](Self::depth), for a map of the frame that is decoded already.
+    pub fn correct_depth(&self, index: usize, map: DepthMap) -> Result<DepthMap, Error> {
+        let warps = self.warps(index)?;
+        Ok(depth(map, self.plan, warps.get(&self.usual)))
     }
 
     /// Frames of other metadata than the recording's get maps of their own.
     fn warps(&self, index: usize) -> Result<OwnWarps, Error> {
-        Ok(OwnWarps(match &self.recording.frames[index].factory {
+        Ok(OwnWarps(match self.recording.frames[index].factory.as_deref() {
             Some(factory)
                 if self.recording.factory() != Some(factory) && self.plan.moves_depth() =>
             {
@@ -254,8 +277,7 @@ impl<'a> Corrector<'a> {
                 let count =
                     |map: &DepthMap| map.depth_m().iter().filter(|z| !z.is_nan()).count() as u64;
                 let before = count(&map);
-                let warps = self.warps(index)?;
-                let map = depth(map, plan, warps.get(&self.usual));
+                let map = self.correct_depth(index, map)?;
                 let n_depths = [before, count(&map)];
                 outputs.push(Output { hash, bytes: encode_depth(&map), n_depths });
             } else {

@@ -32,6 +32,6 @@ mod warp;
 pub use error::Error;
 pub use job::{Corrected, Corrector, FileHash, Progress, correct, correct_observed};
 pub use map::PixelMap;
-pub use plan::{Because, Lens, Mirrored, Plan, Sampling, Step};
+pub use plan::{Because, Called, Lens, Mirrored, Plan, Sampling, Step, Which};
 pub use straight::{BoardLine, Rectifier, Straightness, StreamState, Treatment, board_lines};
 pub use warp::{ColorWarp, DepthWarp, EDGE};

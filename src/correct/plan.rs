@@ -3,7 +3,7 @@
 use super::Error;
 use crate::{
     camera::{Camera, Distortion, Intrinsics, TablePair},
-    diagnose::{Code, Correction, DistortionState},
+    diagnose::{Code, Correction, DistortionState, Finding, Verdict},
     simulate::Fault,
 };
 
@@ -181,6 +181,29 @@ impl Because {
     }
 }
 
+/// What a finding calls for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Called {
+    /// The finding.
+    pub code: Code,
+    /// Its verdict: a fault, or information on what is significant though within the tolerance.
+    pub verdict: Verdict,
+    /// What corrects it.
+    pub steps: Vec<Step>,
+}
+
+/// Which findings are corrected.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Which<'a> {
+    /// Those that are faults.
+    #[default]
+    Faults,
+    /// All that are significant, within the tolerance or not.
+    Significant,
+    /// All that are significant, by these steps only ([`Step::NAMES`]).
+    Only(&'a [&'a str]),
+}
+
 /// What is to be done, each kind of step at most once.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
@@ -205,46 +228,74 @@ impl Plan {
         Ok(Self { steps, sampling })
     }
 
-    /// What the faults of an audit call for: the corrections that its findings name, `state` as the audit found it,
-    /// `camera` the own camera where there is one (for images that are distorted and bring no tables).
+    /// What an audit calls for: the corrections that its findings name, `state` as the audit found it, `camera` the own
+    /// camera where there is one (for images that are distorted and bring no tables).
     pub fn from_findings(
-        findings: &[(Code, Correction)],
+        findings: &[Finding],
         state: DistortionState,
         camera: Option<&Camera>,
+        which: Which<'_>,
         sampling: Sampling,
     ) -> Result<Self, Error> {
-        let mut steps: Vec<(Step, Because)> = Vec::new();
-        for (code, correction) in findings {
-            let because = Because::Finding(*code);
-            match correction {
-                Correction::Focal { focal_px } => {
-                    steps.push((Step::Focal { focal_px: *focal_px }, because));
-                }
+        let mut called = Vec::new();
+        for Finding { code, verdict, correction, .. } in findings {
+            let Some(correction) = correction else { continue };
+            let steps = match correction {
+                Correction::Focal { focal_px } => vec![Step::Focal { focal_px: *focal_px }],
                 Correction::PrincipalPoint { center_px } => {
-                    steps.push((Step::Center { center_px: *center_px }, because));
+                    vec![Step::Center { center_px: *center_px }]
                 }
                 Correction::ScaleIntrinsics { factor } => {
-                    steps.push((Step::ScaleIntrinsics { factor: *factor }, because));
+                    vec![Step::ScaleIntrinsics { factor: *factor }]
                 }
-                Correction::Unmirror => steps.push((Step::Unmirror(Mirrored::Both), because)),
-                Correction::UnmirrorDepth => steps.push((Step::Unmirror(Mirrored::Depth), because)),
+                Correction::Unmirror => vec![Step::Unmirror(Mirrored::Both)],
+                Correction::UnmirrorDepth => vec![Step::Unmirror(Mirrored::Depth)],
                 Correction::Undistort { tables } => {
-                    steps.push((Step::undistort(tables.is_some(), camera)?, because));
+                    vec![Step::undistort(tables.is_some(), camera)?]
                 }
-                Correction::Align { zoom, shift_px } => {
-                    steps.push((Step::DepthZoom { zoom: [*zoom; 2] }, because.clone()));
-                    steps.push((Step::DepthShift { shift_px: *shift_px }, because));
-                }
+                Correction::Align { zoom, shift_px } => vec![
+                    Step::DepthZoom { zoom: [*zoom; 2] },
+                    Step::DepthShift { shift_px: *shift_px },
+                ],
                 Correction::Depth { scale, bias_m } => {
-                    steps.push((Step::Depth { scale: *scale, bias_m: *bias_m }, because));
+                    vec![Step::Depth { scale: *scale, bias_m: *bias_m }]
                 }
+            };
+            called.push(Called { code: *code, verdict: *verdict, steps });
+        }
+        Self::called_for(called, state, which, sampling)
+    }
+
+    /// As [`from_findings`](Self::from_findings), for findings that have come some other way. Scale and bias of depth are one line: where one of them is at fault, the other goes with it if it is significant.
+    pub fn called_for(
+        called: Vec<Called>,
+        state: DistortionState,
+        which: Which<'_>,
+        sampling: Sampling,
+    ) -> Result<Self, Error> {
+        let is_line = |c: &Called| matches!(c.steps[..], [Step::Depth { .. }]);
+        let line_at_fault = called.iter().any(|c| is_line(c) && c.verdict == Verdict::Fault);
+        let mut steps: Vec<(Step, Because)> = Vec::new();
+        for one in called {
+            let taken = match which {
+                Which::Faults => one.verdict == Verdict::Fault || (line_at_fault && is_line(&one)),
+                Which::Significant | Which::Only(_) => true,
+            };
+            if taken {
+                let because = Because::Finding(one.code);
+                steps.extend(one.steps.into_iter().map(|step| (step, because.clone())));
             }
         }
         if state == DistortionState::RectifiedTwice {
             let twice = Step::Undistort(Lens::OwnTablesTwice);
             steps.push((twice, Because::Finding(Code::TD204)));
         }
-        Self::merged(steps, sampling)
+        let Which::Only(names) = which else { return Self::merged(steps, sampling) };
+        // Mirroring takes part in the merge, even where it is not asked for: it tells what was not measured. A camera
+        // that is not asked for must not hide its focal length.
+        let asked = |step: &Step| names.contains(&step.name());
+        steps.retain(|(step, _)| asked(step) || matches!(step, Step::Unmirror(_)));
+        Ok(Self::merged(steps, sampling)?.only(names))
     }
 
     /// As [`because`](Self::because), for steps that several findings have contributed to: scales and zooms multiply,
@@ -398,14 +449,16 @@ impl Plan {
         })
     }
 
-    pub(super) fn unmirror(&self) -> Option<Mirrored> {
+    /// What is mirrored back.
+    pub fn unmirror(&self) -> Option<Mirrored> {
         self.steps.iter().find_map(|(step, _)| match step {
             Step::Unmirror(what) => Some(*what),
             _ => None,
         })
     }
 
-    pub(super) fn zoom(&self) -> [f64; 2] {
+    /// Of the depth map: see [`Step::DepthZoom`].
+    pub fn zoom(&self) -> [f64; 2] {
         let zoom = |(step, _): &(Step, Because)| match step {
             Step::DepthZoom { zoom } => Some(*zoom),
             _ => None,
@@ -413,7 +466,8 @@ impl Plan {
         self.steps.iter().find_map(zoom).unwrap_or([1.0; 2])
     }
 
-    pub(super) fn shift_px(&self) -> [f64; 2] {
+    /// Of the depth map: see [`Step::DepthShift`].
+    pub fn shift_px(&self) -> [f64; 2] {
         let shift = |(step, _): &(Step, Because)| match step {
             Step::DepthShift { shift_px } => Some(*shift_px),
             _ => None,
@@ -421,8 +475,8 @@ impl Plan {
         self.steps.iter().find_map(shift).unwrap_or([0.0; 2])
     }
 
-    /// Scale and bias.
-    pub(super) fn line(&self) -> (f64, f64) {
+    /// Scale and bias of depth, metres: see [`Step::Depth`].
+    pub fn line(&self) -> (f64, f64) {
         let line = |(step, _): &(Step, Because)| match step {
             Step::Depth { scale, bias_m } => Some((*scale, *bias_m)),
             _ => None,
@@ -501,36 +555,64 @@ mod tests {
     #[test]
     fn findings_become_steps() {
         let camera = Camera { intrinsics: SAID, distortion: Distortion::None };
-        let undistort = (Code::TD203, Correction::Undistort { tables: None });
-        let plan = |findings: &[(Code, Correction)], state, camera: Option<&Camera>| {
-            Plan::from_findings(findings, state, camera, Sampling::EdgeAware)
+        let finding = |(code, correction)| Finding {
+            verdict: Verdict::Fault,
+            correction: Some(correction),
+            ..Finding::new(code, crate::diagnose::Unit::Count)
+        };
+        let undistort = finding((Code::TD203, Correction::Undistort { tables: None }));
+        let plan = |findings: &[Finding], state, camera: Option<&Camera>| {
+            Plan::from_findings(findings, state, camera, Which::Faults, Sampling::EdgeAware)
+        };
+        let names = |plan: &Plan| -> Vec<&str> {
+            plan.steps().iter().map(|(step, _)| step.name()).collect()
         };
         let none =
             plan(std::slice::from_ref(&undistort), DistortionState::Distorted, Some(&camera));
         assert!(matches!(none, Err(Error::NoWay(_))));
         let brown = crate::camera::Brown { k1: 0.07, k2: 0.0, p1: 0.0, p2: 0.0, k3: 0.0 };
         let lens = Camera { distortion: Distortion::Brown(brown), ..camera };
-        let focal = (Code::TD201, Correction::Focal { focal_px: 530.0 });
+        let focal = finding((Code::TD201, Correction::Focal { focal_px: 530.0 }));
         let both = plan(&[focal.clone(), undistort], DistortionState::Distorted, Some(&lens));
         // The calibrated camera brings its own focal length.
         assert_eq!(both.unwrap().steps().len(), 1);
-        let depth = [
-            focal,
-            (Code::TD301, Correction::Depth { scale: 1.02, bias_m: 0.0 }),
-            (Code::TD302, Correction::Depth { scale: 1.0, bias_m: 0.004 }),
-            (Code::TD401, Correction::Align { zoom: 0.95, shift_px: [0.0; 2] }),
-            (Code::TD402, Correction::Align { zoom: 1.0, shift_px: [3.0, -1.0] }),
-        ];
-        let mut mirrored = depth.to_vec();
-        mirrored.push((Code::TD403, Correction::UnmirrorDepth));
+        let mut depth = vec![focal];
+        depth.extend(
+            [
+                (Code::TD301, Correction::Depth { scale: 1.02, bias_m: 0.0 }),
+                (Code::TD302, Correction::Depth { scale: 1.0, bias_m: 0.004 }),
+                (Code::TD401, Correction::Align { zoom: 0.95, shift_px: [0.0; 2] }),
+                (Code::TD402, Correction::Align { zoom: 1.0, shift_px: [3.0, -1.0] }),
+            ]
+            .map(finding),
+        );
+        let mut mirrored = depth.clone();
+        mirrored.push(finding((Code::TD403, Correction::UnmirrorDepth)));
         let unread = plan(&mirrored, DistortionState::Rectified, None).unwrap();
-        let names: Vec<&str> = unread.steps().iter().map(|(step, _)| step.name()).collect();
-        assert_eq!(names, ["focal", "mirror"]);
+        assert_eq!(names(&unread), ["focal", "mirror"]);
+
+        // What is significant within the tolerance goes where that is asked for, or with the other half of its line.
+        for i in [0, 2, 3] {
+            depth[i].verdict = Verdict::Info;
+        }
+        let by = |depth: &[Finding], which| {
+            let state = DistortionState::Rectified;
+            Plan::from_findings(depth, state, None, which, Sampling::EdgeAware).unwrap()
+        };
+        let faults = by(&depth, Which::Faults);
+        assert_eq!((names(&faults), faults.line()), (vec!["depth", "shift"], (1.02, 0.004)));
+        assert_eq!(names(&by(&depth, Which::Significant)), ["focal", "depth", "zoom", "shift"]);
+        assert_eq!(names(&by(&depth, Which::Only(&["focal", "center"]))), ["focal"]);
+        depth[1].verdict = Verdict::Info;
+        assert_eq!(names(&by(&depth, Which::Faults)), ["shift"]);
+        assert_eq!(by(&depth, Which::Only(&["depth"])).line(), (1.02, 0.004));
+
+        let depth: Vec<Finding> =
+            depth.into_iter().map(|f| Finding { verdict: Verdict::Fault, ..f }).collect();
         let plan = plan(&depth, DistortionState::RectifiedTwice, None).unwrap();
         assert_eq!(plan.line(), (1.02, 0.004));
         assert_eq!(plan.lens(), Some(&Lens::OwnTablesTwice));
-        let names: Vec<&str> = plan.steps().iter().map(|(step, _)| step.name()).collect();
-        assert_eq!(names, ["focal", "depth", "zoom", "shift", "undistort"]);
+        assert_eq!(names(&plan), ["focal", "depth", "zoom", "shift", "undistort"]);
         assert_eq!((plan.zoom(), plan.shift_px()), ([0.95; 2], [3.0, -1.0]));
     }
 

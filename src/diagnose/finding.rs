@@ -184,7 +184,8 @@ pub struct Finding {
     pub evidence: Vec<Evidence>,
     /// What the person should do now; with *unknown*, what to record to be able to tell. Empty where nothing is.
     pub what_to_do: String,
-    /// What would make the data true, where something would.
+    /// What would make the data true, where something would: of a fault, and of a deviation that is significant though
+    /// within the tolerance (*info*), which is corrected only where that is asked for.
     pub correction: Option<Correction>,
 }
 
@@ -212,6 +213,14 @@ impl Finding {
             evidence: Vec::new(),
             what_to_do: String::new(),
             correction: None,
+        }
+    }
+
+    /// Names the correction where there is something to correct for sure: a fault, or a deviation that is significant
+    /// though within the tolerance.
+    pub(super) fn correct_if_significant(&mut self, correction: Correction) {
+        if matches!(self.verdict, Verdict::Fault | Verdict::Info) {
+            self.correction = Some(correction);
         }
     }
 

@@ -168,11 +168,11 @@ pub(super) fn check(case: &Case<'_>, measured: Option<&Measured>) -> Finding {
                 percent.abs(),
                 if difference.value < 0.0 { "too far" } else { "too near" },
             );
-            finding.correction = Some(Correction::Focal { focal_px });
         }
         Verdict::Unknown | Verdict::Warning => record.clone_into(&mut finding.what_to_do),
         Verdict::Info | Verdict::Ok => {}
     }
+    finding.correct_if_significant(Correction::Focal { focal_px });
     finding
 }
 

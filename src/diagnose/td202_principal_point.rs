@@ -69,11 +69,12 @@ pub(super) fn check(case: &Case<'_>, state: DistortionState) -> Finding {
             finding.what_to_do =
                 "Use the measured principal point together with the measured focal length."
                     .to_owned();
-            finding.correction =
-                Some(Correction::PrincipalPoint { center_px: [own[0].value, own[1].value] });
         }
         Verdict::Unknown | Verdict::Warning => record.clone_into(&mut finding.what_to_do),
         Verdict::Info | Verdict::Ok => {}
     }
+    finding.correct_if_significant(Correction::PrincipalPoint {
+        center_px: [own[0].value, own[1].value],
+    });
     finding
 }

@@ -95,24 +95,20 @@ fn why_unknown(case: &Case<'_>) -> String {
     why
 }
 
-pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
-    let mut finding = Finding::new(Code::TD301, Unit::Percent);
-    finding.tolerance = Some(100.0 * case.tolerances.depth_scale);
-    let (found, focal) = match basis(case, focal) {
-        Ok(both) => both,
-        Err(why) => {
-            finding.summary = format!("Cannot tell whether depth has the right scale: {why}.");
-            RECORD.clone_into(&mut finding.what_to_do);
-            return finding;
-        }
-    };
-    let scaled = Scaled::new(found, focal);
-    let slope = scaled.slope;
+/// Which measure of the scale decides, and what it says.
+struct Judged {
+    verdict: Verdict,
+    deviation: Estimate,
+    how: &'static str,
+    /// Sensor over truth, as it would be corrected.
+    scale: f64,
+}
+
+fn judged(case: &Case<'_>, found: &Registration, scaled: &Scaled) -> Judged {
     let [_, ratio, _] = scaled.ratios();
     let judge = |deviation| Verdict::of(deviation, case.tolerances.depth_scale);
     let somewhere = scaled.ratios().into_iter().any(|ratio| judge(ratio) == Verdict::Fault);
-    let [near_m, _, far_m] = scaled.distances_m;
-    let (verdict, deviation, how) = match judge(slope) {
+    let (verdict, deviation, how) = match judge(scaled.slope) {
         // The slope tells a scale from a bias. Where it is too uncertain, depth at the recorded distances still is true
         // or not, and a wrong scale could hide there only behind a bias that makes up for it.
         Verdict::Unknown => (
@@ -126,8 +122,35 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
             ratio,
             "mean ratio of sensor to board; the slope over distance is steeper, but a bias makes up for it",
         ),
-        verdict => (verdict, slope, "slope over distance, from all of the board's surface"),
+        verdict => (verdict, scaled.slope, "slope over distance, from all of the board's surface"),
     };
+    // Without a bias worth the name the mean ratio knows the scale best.
+    let with_bias = found.bias_m.value.abs() > 3.0 * found.bias_m.sigma;
+    let scale = 1.0 + if with_bias { deviation.value } else { ratio.value };
+    Judged { verdict, deviation, how, scale }
+}
+
+/// What TD301 would have depth divided by; 1 where the scale is not significantly another.
+pub(super) fn divisor(case: &Case<'_>, found: &Registration, scaled: &Scaled) -> f64 {
+    let judged = judged(case, found, scaled);
+    if matches!(judged.verdict, Verdict::Fault | Verdict::Info) { judged.scale } else { 1.0 }
+}
+
+pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
+    let mut finding = Finding::new(Code::TD301, Unit::Percent);
+    finding.tolerance = Some(100.0 * case.tolerances.depth_scale);
+    let (found, focal) = match basis(case, focal) {
+        Ok(both) => both,
+        Err(why) => {
+            finding.summary = format!("Cannot tell whether depth has the right scale: {why}.");
+            RECORD.clone_into(&mut finding.what_to_do);
+            return finding;
+        }
+    };
+    let scaled = Scaled::new(found, focal);
+    let [_, ratio, _] = scaled.ratios();
+    let [near_m, _, far_m] = scaled.distances_m;
+    let Judged { verdict, deviation, how, scale } = judged(case, found, &scaled);
     finding.verdict = verdict;
     finding.value = Some(100.0 * deviation.value);
     finding.sigma = Some(100.0 * deviation.sigma);
@@ -162,18 +185,15 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
     );
     match verdict {
         Verdict::Fault => {
-            // Without a bias worth the name the mean ratio knows the scale best.
-            let with_bias = found.bias_m.value.abs() > 3.0 * found.bias_m.sigma;
-            let scale = 1.0 + if with_bias { deviation.value } else { ratio.value };
             finding.what_to_do = format!(
                 "Divide depth by {scale:.4}. Make sure first that the board's squares really measure {:.3} mm: a board \
                  printed at another scale looks just so.",
                 1e3 * case.board.square_m
             );
-            finding.correction = Some(Correction::Depth { scale, bias_m: 0.0 });
         }
         Verdict::Unknown | Verdict::Warning => RECORD.clone_into(&mut finding.what_to_do),
         Verdict::Info | Verdict::Ok => {}
     }
+    finding.correct_if_significant(Correction::Depth { scale, bias_m: 0.0 });
     finding
 }

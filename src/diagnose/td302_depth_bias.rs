@@ -3,7 +3,7 @@
 use super::{
     Case, Code, Correction, Evidence, Finding, Unit, Verdict,
     td201_focal_length::Measured,
-    td301_depth_scale::{RECORD, Scaled, basis},
+    td301_depth_scale::{RECORD, Scaled, basis, divisor},
 };
 
 pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
@@ -48,6 +48,9 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
         Evidence::number("center_m", found.center_m),
         Evidence::number("correlation_with_scale", found.scale_bias_correlation()),
     ];
+    // One line goes through the recorded distances, and both findings correct it: what TD301's scale leaves there.
+    let divisor = divisor(case, found, &scaled);
+    let bias_m = offset_m.value - (divisor - 1.0) * found.center_m;
     let words = match verdict {
         Verdict::Fault => "Depth has a bias",
         Verdict::Info => "Depth has a bias within the tolerance",
@@ -63,13 +66,17 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
     match verdict {
         Verdict::Fault => {
             finding.what_to_do = format!(
-                "Subtract {:.2} mm from depth, after TD301's scale.",
-                1e3 * deviation_m.value
+                "Subtract {:.2} mm from depth{}.",
+                1e3 * bias_m,
+                if divisor == 1.0 { "" } else { ", then divide it as TD301 says" }
             );
-            finding.correction = Some(Correction::Depth { scale: 1.0, bias_m: deviation_m.value });
         }
         Verdict::Unknown | Verdict::Warning => RECORD.clone_into(&mut finding.what_to_do),
         Verdict::Info | Verdict::Ok => {}
+    }
+    // Where the scale tells it all nothing is left.
+    if bias_m.abs() > 1e-6 {
+        finding.correct_if_significant(Correction::Depth { scale: 1.0, bias_m });
     }
     finding
 }

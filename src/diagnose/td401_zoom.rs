@@ -60,11 +60,11 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
                 zoom.value,
                 edge_px(case, deviation.value)
             );
-            finding.correction = Some(Correction::Align { zoom: zoom.value, shift_px: [0.0; 2] });
         }
         Verdict::Unknown | Verdict::Warning => RECORD.clone_into(&mut finding.what_to_do),
         Verdict::Info | Verdict::Ok => {}
     }
+    finding.correct_if_significant(Correction::Align { zoom: zoom.value, shift_px: [0.0; 2] });
     finding
 }
 

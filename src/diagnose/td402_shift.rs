@@ -59,12 +59,11 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
         Verdict::Fault => {
             finding.what_to_do =
                 "Shift the depth map back before depth is looked up at a colour pixel.".to_owned();
-            finding.correction =
-                Some(Correction::Align { zoom: 1.0, shift_px: [x.value, y.value] });
         }
         Verdict::Unknown | Verdict::Warning => RECORD.clone_into(&mut finding.what_to_do),
         Verdict::Info | Verdict::Ok => {}
     }
+    finding.correct_if_significant(Correction::Align { zoom: 1.0, shift_px: [x.value, y.value] });
     finding
 }
 

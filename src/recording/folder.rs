@@ -2,13 +2,13 @@
 
 use std::{
     fs::{self, File},
-    io::{self, Read, Seek, SeekFrom},
+    io::{self, BufWriter, Read, Seek, SeekFrom, Write},
     path::{Path, PathBuf},
     sync::{Arc, Mutex, PoisonError},
 };
 
 use super::{
-    Error, Limits, Sink, Source,
+    Error, Fill, Limits, Sink, Source,
     source::{join, too_long},
     zeiss,
 };
@@ -81,21 +81,38 @@ impl Source for Folder {
 
     fn read(&self, name: &str, max_bytes: u64) -> Result<Vec<u8>, Error> {
         let path = self.path.join(name);
-        let fail = |error| file_error(&path, &error);
-        // Asked before opening: opening a pipe would wait for ever.
-        let metadata = fs::metadata(&path).map_err(fail)?;
-        if !metadata.is_file() {
-            let why = "not a file".to_owned();
-            return Err(Error::File { file: path.display().to_string(), why });
-        }
-        let mut bytes = Vec::with_capacity(metadata.len().min(max_bytes) as usize + 1);
-        let file = File::open(&path).map_err(fail)?;
-        file.take(max_bytes.saturating_add(1)).read_to_end(&mut bytes).map_err(fail)?;
+        let (file, length) = open_file(&path)?;
+        let mut bytes = Vec::with_capacity(length.min(max_bytes) as usize + 1);
+        file.take(max_bytes.saturating_add(1))
+            .read_to_end(&mut bytes)
+            .map_err(|error| file_error(&path, &error))?;
         if bytes.len() as u64 > max_bytes {
             return Err(too_long(path.display().to_string(), max_bytes));
         }
         Ok(bytes)
     }
+
+    fn open(&self, name: &str, max_bytes: u64) -> Result<Box<dyn Read + '_>, Error> {
+        let path = self.path.join(name);
+        let (file, length) = open_file(&path)?;
+        if length > max_bytes {
+            return Err(too_long(path.display().to_string(), max_bytes));
+        }
+        // It may grow while it is read.
+        Ok(Box::new(file.take(max_bytes)))
+    }
+}
+
+/// A file and its length.
+fn open_file(path: &Path) -> Result<(File, u64), Error> {
+    let fail = |error| file_error(path, &error);
+    // Asked before opening: opening a pipe would wait for ever.
+    let metadata = fs::metadata(path).map_err(fail)?;
+    if !metadata.is_file() {
+        let why = "not a file".to_owned();
+        return Err(Error::File { file: path.display().to_string(), why });
+    }
+    Ok((File::open(path).map_err(fail)?, metadata.len()))
 }
 
 /// A folder that is written to.
@@ -124,6 +141,18 @@ impl Sink for FolderSink {
         let path = self.path.join(name);
         fs::write(&path, bytes).map_err(|error| file_error(&path, &error))
     }
+
+    fn stream(&mut self, name: &str, fill: &mut Fill<'_>) -> Result<(), Error> {
+        fill_file(&self.path.join(name), fill)
+    }
+}
+
+/// Writes a file piece by piece.
+pub(super) fn fill_file(path: &Path, fill: &mut Fill<'_>) -> Result<(), Error> {
+    let fail = |error| file_error(path, &error);
+    let mut file = BufWriter::new(File::create(path).map_err(fail)?);
+    fill(&mut |bytes| file.write_all(bytes).map_err(fail))?;
+    file.flush().map_err(fail)
 }
 
 pub(super) fn file_error(path: &Path, error: &io::Error) -> Error {

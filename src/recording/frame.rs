@@ -1,5 +1,7 @@
 //! One moment of a recording.
 
+use std::sync::Arc;
+
 use crate::{
     camera::{Intrinsics, TablePair},
     geom::Pixel,
@@ -16,8 +18,8 @@ pub struct Frame {
     pub color: Option<String>,
     /// Name of the depth image inside the recording.
     pub depth: Option<String>,
-    /// What the factory says about the camera at this frame.
-    pub factory: Option<Factory>,
+    /// What the factory says about the camera at this frame: one and the same for all frames of which it says the same.
+    pub factory: Option<Arc<Factory>>,
     /// Columns and rows of the colour image after the colour camera's metadata.
     pub(super) color_size: Option<[usize; 2]>,
 }

@@ -1,6 +1,10 @@
 //! Arrays of records in JSON, with the place of whatever is wrong in them.
 
-use std::{fmt, marker::PhantomData};
+use std::{
+    fmt,
+    io::{BufReader, Read},
+    marker::PhantomData,
+};
 
 use serde::{
     Deserialize, Deserializer,
@@ -12,12 +16,53 @@ use super::Error;
 /// All records of a file that is one JSON array.
 pub(super) fn records<T: DeserializeOwned>(file: &str, bytes: &[u8]) -> Result<Vec<T>, Error> {
     let mut records = Vec::new();
-    let mut deserializer = serde_json::Deserializer::from_slice(bytes);
-    let result =
-        Records(&mut records).deserialize(&mut deserializer).and_then(|()| deserializer.end());
-    // The array may also end before its last record: then the next one is what is cut.
-    result.map_err(|error| locate(file, bytes, records.len() + 1, &error))?;
+    parse_records(file, bytes, &mut |record| {
+        records.push(record);
+        Ok(())
+    })?;
     Ok(records)
+}
+
+/// Hands the records of a file that is one JSON array to `each`, one after the other, so that never more than one lies
+/// in memory. Where the file is no such array, `whole` is asked for its bytes to tell the place.
+pub(super) fn each_record<T: DeserializeOwned>(
+    file: &str,
+    reader: impl Read,
+    whole: impl FnOnce() -> Result<Vec<u8>, Error>,
+    each: &mut Each<'_, T>,
+) -> Result<(), Error> {
+    let mut stopped = None;
+    let mut deserializer = serde_json::Deserializer::from_reader(BufReader::new(reader));
+    let records = Records { each, n: &mut 0, stopped: &mut stopped };
+    let result = records.deserialize(&mut deserializer).and_then(|()| deserializer.end());
+    match (result, stopped) {
+        (Ok(()), _) => Ok(()),
+        (Err(_), Some(why)) => Err(why),
+        (Err(error), None) => {
+            let unreadable = |why| Error::File { file: file.to_owned(), why };
+            if error.is_io() {
+                return Err(unreadable(error.to_string()));
+            }
+            parse_records::<T>(file, &whole()?, &mut |_| Ok(()))?;
+            Err(unreadable("changed while it was read".into()))
+        }
+    }
+}
+
+/// What is done with each record; its error ends the reading.
+type Each<'a, T> = dyn FnMut(T) -> Result<(), Error> + 'a;
+
+fn parse_records<T: DeserializeOwned>(
+    file: &str,
+    bytes: &[u8],
+    each: &mut Each<'_, T>,
+) -> Result<(), Error> {
+    let (mut n, mut stopped) = (0, None);
+    let mut deserializer = serde_json::Deserializer::from_slice(bytes);
+    let records = Records { each, n: &mut n, stopped: &mut stopped };
+    let result = records.deserialize(&mut deserializer).and_then(|()| deserializer.end());
+    // The array may also end before its last record: then the next one is what is cut.
+    result.map_err(|error| stopped.unwrap_or_else(|| locate(file, bytes, n + 1, &error)))
 }
 
 fn locate(file: &str, bytes: &[u8], record: usize, error: &serde_json::Error) -> Error {
@@ -42,10 +87,14 @@ fn shorten(text: &str) -> String {
     short
 }
 
-/// Collects the elements of an array one by one, so that those before an error are counted.
-struct Records<'a, T>(&'a mut Vec<T>);
+/// Takes the elements of an array one by one, so that those before an error are counted.
+struct Records<'a, 'b, T> {
+    each: &'a mut Each<'b, T>,
+    n: &'a mut usize,
+    stopped: &'a mut Option<Error>,
+}
 
-impl<'de, T: Deserialize<'de>> DeserializeSeed<'de> for Records<'_, T> {
+impl<'de, T: Deserialize<'de>> DeserializeSeed<'de> for Records<'_, '_, T> {
     type Value = ();
 
     fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
@@ -53,7 +102,7 @@ impl<'de, T: Deserialize<'de>> DeserializeSeed<'de> for Records<'_, T> {
     }
 }
 
-impl<'de, T: Deserialize<'de>> Visitor<'de> for Records<'_, T> {
+impl<'de, T: Deserialize<'de>> Visitor<'de> for Records<'_, '_, T> {
     type Value = ();
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -62,7 +111,11 @@ impl<'de, T: Deserialize<'de>> Visitor<'de> for Records<'_, T> {
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<(), A::Error> {
         while let Some(record) = seq.next_element()? {
-            self.0.push(record);
+            if let Err(why) = (self.each)(record) {
+                *self.stopped = Some(why);
+                return Err(serde::de::Error::custom("stopped"));
+            }
+            *self.n += 1;
         }
         Ok(())
     }
@@ -136,6 +189,18 @@ mod tests {
     }
 
     #[test]
+    fn whoever_takes_records_may_stop() {
+        let file = br#"[{"K": "(1, 2)", "N": 3}, {"K": "(1, 2)", "N": 4}, !"#;
+        let mut seen = Vec::new();
+        let enough = Error::NoImages { path: "enough".into() };
+        let result = each_record("f", &file[..], || unreachable!(), &mut |record: Record| {
+            seen.push(record.n);
+            if record.n == 4.0 { Err(enough.clone()) } else { Ok(()) }
+        });
+        assert_eq!((result, seen), (Err(enough), vec![3.0, 4.0]));
+    }
+
+    #[test]
     fn every_error_has_its_place() {
         let good = r#"{"K": "(1, 2)", "N": 3, "unknown": [{}]}"#;
         assert_eq!(records::<Record>("f", b"[]").unwrap(), []);
@@ -168,9 +233,13 @@ mod tests {
             ("} ]", &["record 2", "expected `,` or `]`"]),
             (deep.as_str(), &["record 2"]),
         ] {
-            let message = records::<Record>("f", format!("[\n{good}{text}").as_bytes())
-                .unwrap_err()
-                .to_string();
+            let file = format!("[\n{good}{text}").into_bytes();
+            let error = records::<Record>("f", &file).unwrap_err();
+            let whole = || Ok(file.clone());
+            let piecewise =
+                each_record("f", file.as_slice(), whole, &mut |_: Record| Ok(())).unwrap_err();
+            assert_eq!(piecewise, error, "read record by record");
+            let message = error.to_string();
             for part in expected {
                 assert!(message.contains(part), "{text:.40}: {message}");
             }

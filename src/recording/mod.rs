@@ -63,10 +63,14 @@ pub use rewrite::Amendment;
 pub use source::{Memory, Source};
 #[cfg(feature = "fs")]
 pub use whole::WholeFolder;
-pub use write::{Sink, Writer, encode_depth};
+pub use write::{Fill, Push, Sink, Writer, encode_depth};
 pub use zeiss::factories_in_metadata;
 
-use std::{fmt, sync::Arc};
+use std::{
+    fmt,
+    io::{self, Read},
+    sync::Arc,
+};
 
 use crate::{
     board::CharucoBoard,
@@ -85,7 +89,7 @@ pub struct Recording {
     /// What is odd, but not fatal.
     pub problems: Vec<Problem>,
     /// The first metadata of the file, for recordings none of whose frames has its own.
-    fallback: Option<Factory>,
+    fallback: Option<Arc<Factory>>,
     place: String,
     prefix: String,
     source: Arc<dyn Source>,
@@ -114,7 +118,7 @@ impl Recording {
     /// The factory metadata that stand for the whole recording: those of the first frame that has any, else the
     /// first of the file. Where they differ between frames `problems` says so.
     pub fn factory(&self) -> Option<&Factory> {
-        self.frames.iter().find_map(|frame| frame.factory.as_ref()).or(self.fallback.as_ref())
+        self.frames.iter().find_map(|frame| frame.factory.as_deref()).or(self.fallback.as_deref())
     }
 
     /// The colour image of a frame, as grey.
@@ -137,7 +141,7 @@ impl Recording {
         let bytes = self.file(name)?;
         let depth = DepthMap::from_png(&bytes, zeiss::DEPTH_UNIT_M, &self.limits.image)
             .map_err(|source| Error::Image { file: self.path(name), source })?;
-        let expected = self.frames[frame].factory.as_ref().map(Factory::size);
+        let expected = self.frames[frame].factory.as_deref().map(Factory::size);
         let size = [depth.width(), depth.height()];
         self.check_size(frame, name, size, zeiss::DEPTH_METADATA, expected)?;
         Ok(depth)
@@ -146,6 +150,32 @@ impl Recording {
     /// The bytes of any file of the recording, like those that [`Frame::color`] and [`Frame::depth`] name.
     pub fn file(&self, name: &str) -> Result<Vec<u8>, Error> {
         self.source.read(&format!("{}{name}", self.prefix), self.limits.file_bytes)
+    }
+
+    /// Hands a file over piece by piece, for what need not lie in memory as a whole.
+    pub fn pieces(&self, name: &str, push: &mut Push<'_>) -> Result<(), Error> {
+        let mut file = self.open_file(name)?;
+        let mut buffer = vec![0; 1 << 16];
+        loop {
+            match file.read(&mut buffer) {
+                Ok(0) => return Ok(()),
+                Ok(n) => push(&buffer[..n])?,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => {
+                    return Err(Error::File { file: self.path(name), why: error.to_string() });
+                }
+            }
+        }
+    }
+
+    fn open_file(&self, name: &str) -> Result<Box<dyn Read + '_>, Error> {
+        self.source.open(&format!("{}{name}", self.prefix), self.limits.file_bytes)
+    }
+
+    /// The frame of a time as the files write it.
+    pub fn frame_at(&self, timestamp: i64) -> Option<&Frame> {
+        let index = self.frames.binary_search_by_key(&timestamp, |frame| frame.timestamp).ok()?;
+        Some(&self.frames[index])
     }
 
     /// The names of all files of the recording, folders inside included, in order.
@@ -200,7 +230,7 @@ impl Recording {
             name,
             size,
             zeiss::DEPTH_METADATA,
-            factory.as_ref().map(Factory::size),
+            factory.as_deref().map(Factory::size),
         )
     }
 

@@ -1,8 +1,11 @@
 //! Frames from the names of images and the timestamps of metadata: paired by time, never by position.
 
-use std::collections::{BTreeMap, BTreeSet, btree_map::Entry};
+use std::{
+    collections::{BTreeMap, BTreeSet, btree_map::Entry},
+    sync::Arc,
+};
 
-use super::{Error, Factory, Frame, Problem};
+use super::{Factory, Frame, Problem};
 
 /// An image of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -107,21 +110,19 @@ pub(super) fn by_time<T>(
 /// Frames in order of time. `factory` and `color_size` tell what the metadata say at a time.
 pub(super) fn frames(
     images: BTreeMap<i64, Images>,
-    mut factory: impl FnMut(i64) -> Result<Option<Factory>, Error>,
+    mut factory: impl FnMut(i64) -> Option<Arc<Factory>>,
     color_size: impl Fn(i64) -> Option<[usize; 2]>,
-) -> Result<Vec<Frame>, Error> {
+) -> Vec<Frame> {
     let first = images.keys().next().copied().unwrap_or(0);
     images
         .into_iter()
-        .map(|(timestamp, Images { color, depth })| {
-            Ok(Frame {
-                t_ns: (timestamp - first) * 1_000_000,
-                timestamp,
-                color,
-                depth,
-                factory: factory(timestamp)?,
-                color_size: color_size(timestamp),
-            })
+        .map(|(timestamp, Images { color, depth })| Frame {
+            t_ns: (timestamp - first) * 1_000_000,
+            timestamp,
+            color,
+            depth,
+            factory: factory(timestamp),
+            color_size: color_size(timestamp),
         })
         .collect()
 }
@@ -171,7 +172,7 @@ mod tests {
                 Problem::DepthWithoutColor { timestamps: vec![4] },
             ]
         );
-        let frames = frames(images, |_| Ok(None), |_| None).unwrap();
+        let frames = frames(images, |_| None, |_| None);
         assert_eq!(frames.iter().map(|f| f.t_ns).collect::<Vec<_>>(), [0, 1_000_000, 17_000_000]);
     }
 

@@ -8,7 +8,7 @@ use serde::{
 use serde_json::value::RawValue;
 
 use super::{
-    Error, Recording, json,
+    Error, Push, Recording, json,
     write::tuple,
     zeiss::{CAMERA_METADATA, DEPTH_METADATA},
 };
@@ -25,32 +25,31 @@ pub struct Amendment {
 }
 
 impl Recording {
-    /// The metadata files as they are but for what `amend` says of each time (the timestamp as written). Files that are
-    /// not there are left out.
+    /// The metadata files that are there.
+    pub fn metadata_names(&self) -> Vec<&'static str> {
+        let names = self.file_names();
+        [DEPTH_METADATA, CAMERA_METADATA].into_iter().filter(|file| names.contains(file)).collect()
+    }
+
+    /// A metadata file as it is but for what `amend` says of each time (the timestamp as written), piece by piece.
     pub fn amended_metadata(
         &self,
-        amend: impl Fn(i64) -> Amendment,
-    ) -> Result<Vec<(&'static str, Vec<u8>)>, Error> {
-        let mut files = Vec::new();
-        for file in [DEPTH_METADATA, CAMERA_METADATA] {
-            if !self.file_names().contains(&file) {
-                continue;
+        file: &str,
+        amend: &dyn Fn(i64) -> Amendment,
+        push: &mut Push<'_>,
+    ) -> Result<(), Error> {
+        let mut begun = false;
+        let whole = || self.file(file);
+        let reader = self.open_file(file)?;
+        json::each_record(&self.path(file), reader, whole, &mut |mut record: Record| {
+            if let Some(timestamp) = record.timestamp() {
+                record.amend(&amend(timestamp));
             }
-            let bytes = self.file(file)?;
-            let mut text = String::with_capacity(bytes.len() + 4);
-            let records: Vec<Record> = json::records(&self.path(file), &bytes)?;
-            drop(bytes);
-            for mut record in records {
-                if let Some(timestamp) = record.timestamp() {
-                    record.amend(&amend(timestamp));
-                }
-                text.push_str(if text.is_empty() { "[\n" } else { "," });
-                text.push_str(&record.to_text());
-            }
-            text.push_str(if text.is_empty() { "[\n]\n" } else { "\n]\n" });
-            files.push((file, text.into_bytes()));
-        }
-        Ok(files)
+            push(if begun { b"," } else { b"[\n" })?;
+            begun = true;
+            push(record.to_text().as_bytes())
+        })?;
+        push(if begun { b"\n]\n" } else { b"[\n]\n" })
     }
 }
 
@@ -126,7 +125,7 @@ mod tests {
     use super::*;
     use crate::{
         image::{DepthMap, Rgb},
-        recording::{Factory, Limits, Memory, Writer},
+        recording::{Factory, Limits, Memory, Sink, Writer},
     };
 
     #[test]
@@ -147,15 +146,21 @@ mod tests {
         memory.insert(DEPTH_METADATA, text);
         let recording = Recording::from_source(Arc::new(memory), &Limits::default()).unwrap();
         assert!(recording.factory().unwrap().tables.is_some());
-        let files = recording.amended_metadata(|_| Amendment::default()).unwrap();
-        assert_eq!(files[0].0, DEPTH_METADATA);
-        assert_eq!(std::str::from_utf8(&files[0].1).unwrap(), text);
-        assert_eq!(files[1], (CAMERA_METADATA, recording.file(CAMERA_METADATA).unwrap()));
+        let amended = |file, amendment| {
+            let mut memory = Memory::default();
+            let amend = &|_| amendment;
+            memory.stream(file, &mut |push| recording.amended_metadata(file, amend, push)).unwrap();
+            String::from_utf8(memory.get(file).unwrap().to_vec()).unwrap()
+        };
+        assert_eq!(recording.metadata_names(), [DEPTH_METADATA, CAMERA_METADATA]);
+        assert_eq!(amended(DEPTH_METADATA, Amendment::default()), text);
+        assert_eq!(
+            amended(CAMERA_METADATA, Amendment::default()).as_bytes(),
+            recording.file(CAMERA_METADATA).unwrap()
+        );
 
         let intrinsics = Some(Intrinsics { fx: 8.5, fy: 8.25, cx: 3.0, cy: 2.0, ..k });
-        let files =
-            recording.amended_metadata(|_| Amendment { intrinsics, rectified: true }).unwrap();
-        let amended = std::str::from_utf8(&files[0].1).unwrap();
+        let amended = amended(DEPTH_METADATA, Amendment { intrinsics, rectified: true });
         for (from, to) in [
             ("(9.0, 0.0, 3.5)", "(8.5, 0.0, 3.0)"),
             ("(0.0, 9.0, 2.5)", "(0.0, 8.25, 2.0)"),

@@ -1,6 +1,6 @@
 //! Where the files of a recording come from: named readers.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, io::Read};
 
 use super::{Error, Sink};
 
@@ -14,6 +14,11 @@ pub trait Source: Send + Sync {
 
     /// The whole content of a file; [`Error::Limit`] where it is longer than `max_bytes`.
     fn read(&self, name: &str, max_bytes: u64) -> Result<Vec<u8>, Error>;
+
+    /// A file from its beginning on, for what need not lie in memory as a whole; bounded like [`read`](Self::read).
+    fn open(&self, name: &str, max_bytes: u64) -> Result<Box<dyn Read + '_>, Error> {
+        Ok(Box::new(std::io::Cursor::new(self.read(name, max_bytes)?)))
+    }
 }
 
 /// Files in memory: to read a recording that came some other way than through a file system, or to write one.
@@ -41,6 +46,15 @@ impl Memory {
         self.files.get(name).map(Vec::as_slice)
     }
 
+    fn bounded(&self, name: &str, max_bytes: u64) -> Result<&[u8], Error> {
+        let file = join(&self.place, name);
+        match self.get(name) {
+            None => Err(Error::File { file, why: "no such file".into() }),
+            Some(bytes) if bytes.len() as u64 > max_bytes => Err(too_long(file, max_bytes)),
+            Some(bytes) => Ok(bytes),
+        }
+    }
+
     /// All files by name, in order.
     pub fn files(&self) -> &BTreeMap<String, Vec<u8>> {
         &self.files
@@ -57,12 +71,11 @@ impl Source for Memory {
     }
 
     fn read(&self, name: &str, max_bytes: u64) -> Result<Vec<u8>, Error> {
-        let file = join(&self.place, name);
-        match self.files.get(name) {
-            None => Err(Error::File { file, why: "no such file".into() }),
-            Some(bytes) if bytes.len() as u64 > max_bytes => Err(too_long(file, max_bytes)),
-            Some(bytes) => Ok(bytes.clone()),
-        }
+        self.bounded(name, max_bytes).map(<[u8]>::to_vec)
+    }
+
+    fn open(&self, name: &str, max_bytes: u64) -> Result<Box<dyn Read + '_>, Error> {
+        Ok(Box::new(self.bounded(name, max_bytes)?))
     }
 }
 

@@ -6,7 +6,10 @@ use std::{
     path::{Component, Path, PathBuf},
 };
 
-use super::{Error, Sink, folder::file_error};
+use super::{
+    Error, Fill, Sink,
+    folder::{file_error, fill_file},
+};
 
 /// A folder written under another name beside its place, and renamed when it is whole.
 ///
@@ -80,8 +83,9 @@ impl WholeFolder {
     }
 }
 
-impl Sink for WholeFolder {
-    fn write(&mut self, name: &str, bytes: &[u8]) -> Result<(), Error> {
+impl WholeFolder {
+    /// Where a file of this name goes; the folders inside are made.
+    fn place(&self, name: &str) -> Result<PathBuf, Error> {
         let inside = Path::new(name);
         let path = self.partial.join(inside);
         if name == LOCK || !inside.components().all(|part| matches!(part, Component::Normal(_))) {
@@ -91,7 +95,21 @@ impl Sink for WholeFolder {
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(|e| file_error(folder, &e))?;
         }
+        Ok(path)
+    }
+}
+
+impl Sink for WholeFolder {
+    fn write(&mut self, name: &str, bytes: &[u8]) -> Result<(), Error> {
+        let path = self.place(name)?;
         fs::write(&path, bytes).map_err(|e| file_error(&path, &e))?;
+        self.files.push(path);
+        Ok(())
+    }
+
+    fn stream(&mut self, name: &str, fill: &mut Fill<'_>) -> Result<(), Error> {
+        let path = self.place(name)?;
+        fill_file(&path, fill)?;
         self.files.push(path);
         Ok(())
     }

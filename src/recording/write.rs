@@ -13,7 +13,23 @@ use crate::{
 pub trait Sink {
     /// Writes a whole file.
     fn write(&mut self, name: &str, bytes: &[u8]) -> Result<(), Error>;
+
+    /// Writes a file of which `fill` hands over piece after piece, for what need not lie in memory as a whole.
+    fn stream(&mut self, name: &str, fill: &mut Fill<'_>) -> Result<(), Error> {
+        let mut whole = Vec::new();
+        fill(&mut |bytes| {
+            whole.extend_from_slice(bytes);
+            Ok(())
+        })?;
+        self.write(name, &whole)
+    }
 }
+
+/// Takes the next piece of a file.
+pub type Push<'a> = dyn FnMut(&[u8]) -> Result<(), Error> + 'a;
+
+/// Hands the pieces of a file over.
+pub type Fill<'a> = dyn FnMut(&mut Push<'_>) -> Result<(), Error> + 'a;
 
 /// Writes a recording frame by frame, metadata in the very spelling of the capture app, so that the programs of
 /// others read it too.

@@ -75,15 +75,37 @@ pub(super) fn open(
         source.read(&format!("{prefix}{file}"), limits.file_bytes).map(Some)
     };
 
+    let open = |file: &str| source.open(&format!("{prefix}{file}"), limits.file_bytes);
+    let whole = |file: &str| source.read(&format!("{prefix}{file}"), limits.file_bytes);
+    let (depth_file, camera_file) = (join(&place, DEPTH_METADATA), join(&place, CAMERA_METADATA));
+
+    // Every record is checked, also those without an image. Records of metadata are longer than all else that is kept
+    // of a frame: none is kept, and frames of which they say the same share what they say.
+    let mut odd = Vec::new();
     let mut depth_records = Vec::new();
-    match read(DEPTH_METADATA)? {
-        Some(bytes) => depth_records = json::records(&join(&place, DEPTH_METADATA), &bytes)?,
-        None => problems.push(Problem::MetadataMissing { file: DEPTH_METADATA }),
+    if names.contains(&DEPTH_METADATA) {
+        let mut last = None;
+        let whole = || whole(DEPTH_METADATA);
+        json::each_record(&depth_file, open(DEPTH_METADATA)?, whole, &mut |r: DepthRecord| {
+            let record = depth_records.len() + 1;
+            let at = At { file: &depth_file, record, timestamp: r.timestamp };
+            depth_records.push((r.timestamp, shared(&mut last, r.factory(at, &mut odd)?)));
+            // One mention of each kind is enough: all frames come from one camera.
+            odd.dedup_by_key(|problem| mem::discriminant(problem));
+            Ok(())
+        })?;
+    } else {
+        problems.push(Problem::MetadataMissing { file: DEPTH_METADATA });
     }
     let mut camera_records = Vec::new();
-    match read(CAMERA_METADATA)? {
-        Some(bytes) => camera_records = json::records(&join(&place, CAMERA_METADATA), &bytes)?,
-        None => problems.push(Problem::MetadataMissing { file: CAMERA_METADATA }),
+    if names.contains(&CAMERA_METADATA) {
+        let whole = || whole(CAMERA_METADATA);
+        json::each_record(&camera_file, open(CAMERA_METADATA)?, whole, &mut |r: CameraRecord| {
+            camera_records.push(r);
+            Ok(())
+        })?;
+    } else {
+        problems.push(Problem::MetadataMissing { file: CAMERA_METADATA });
     }
     let board = match read(BOARD)? {
         Some(bytes) => {
@@ -104,17 +126,21 @@ pub(super) fn open(
         },
     };
 
-    let time = |r: &DepthRecord| r.timestamp;
+    let time = |r: &(i64, Arc<Factory>)| r.0;
     let depth_records = pairing::by_time(DEPTH_METADATA, depth_records, time, &mut problems);
+    let mut factories: BTreeMap<i64, Arc<Factory>> = depth_records
+        .into_iter()
+        .map(|(timestamp, (_, (_, factory)))| (timestamp, factory))
+        .collect();
     let time = |r: &CameraRecord| r.timestamp;
     let camera_records = pairing::by_time(CAMERA_METADATA, camera_records, time, &mut problems);
     let timestamps: Vec<i64> =
-        depth_records.keys().filter(|t| !images.contains_key(t)).copied().collect();
+        factories.keys().filter(|t| !images.contains_key(t)).copied().collect();
     if !timestamps.is_empty() {
         problems.push(Problem::MetadataWithoutImages { timestamps });
     }
     for (file, known) in [
-        (DEPTH_METADATA, depth_records.keys().copied().collect::<BTreeSet<_>>()),
+        (DEPTH_METADATA, factories.keys().copied().collect::<BTreeSet<_>>()),
         (CAMERA_METADATA, camera_records.keys().copied().collect()),
     ] {
         let timestamps: Vec<i64> = images.keys().filter(|t| !known.contains(t)).copied().collect();
@@ -124,32 +150,28 @@ pub(super) fn open(
         }
     }
 
-    // Every record is checked, also those without an image.
-    let (depth_file, camera_file) = (join(&place, DEPTH_METADATA), join(&place, CAMERA_METADATA));
-    let mut odd = Vec::new();
-    let mut factories = BTreeMap::new();
-    for (&timestamp, (record, depth)) in &depth_records {
-        let at = At { file: &depth_file, record: *record, timestamp };
-        factories.insert(timestamp, depth.factory(at, &mut odd)?);
-    }
+    let mut last = None;
     for (&timestamp, (record, camera)) in &camera_records {
         let at = At { file: &camera_file, record: *record, timestamp };
-        camera.complete(at, factories.get_mut(&timestamp))?;
+        let slot = factories.get_mut(&timestamp);
+        let mut complete = slot.as_deref().map(|factory| Factory::clone(factory));
+        camera.complete(at, complete.as_mut())?;
+        if let (Some(slot), Some(complete)) = (slot, complete) {
+            *slot = shared(&mut last, complete);
+        }
     }
-    // One mention of each kind is enough: all frames come from one camera.
-    odd.dedup_by_key(|problem| mem::discriminant(problem));
     problems.extend(odd);
-    problems.extend(variation(factories.values()));
+    problems.extend(variation(factories.values().map(Arc::as_ref)));
 
     let fallback = factories.values().next().cloned();
     let frames = pairing::frames(
         images,
-        |t| Ok(factories.remove(&t)),
+        |t| factories.remove(&t),
         |t| {
             let (_, camera) = camera_records.get(&t)?;
             Some([camera.width as usize, camera.height as usize])
         },
-    )?;
+    );
     Ok(Recording {
         name,
         board,
@@ -161,6 +183,14 @@ pub(super) fn open(
         source,
         limits: limits.clone(),
     })
+}
+
+/// The last one again where it says the same.
+fn shared(last: &mut Option<Arc<Factory>>, factory: Factory) -> Arc<Factory> {
+    match last {
+        Some(last) if **last == factory => Arc::clone(last),
+        _ => Arc::clone(last.insert(Arc::new(factory))),
+    }
 }
 
 /// What a `DepthMetadata.json` says about the camera, record by record; `file` names it in messages.

@@ -498,7 +498,7 @@ mod tests {
             assert!((read.intrinsics.fx - factory.intrinsics.fx).abs() < 1e-9);
             assert_eq!(read.geometric_distortion_correction, Some(tables));
             assert_eq!(read.tables.is_some(), tables);
-            if let (Some(read), Some(written)) = (read.tables, factory.tables) {
+            if let (Some(read), Some(written)) = (&read.tables, factory.tables) {
                 assert_eq!(read.inverse.magnification, written.inverse.magnification);
                 assert!(read.inverse.center.distance(written.inverse.center) < 1e-9);
             }

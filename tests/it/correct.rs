@@ -5,7 +5,7 @@ use std::sync::Arc;
 use truedepth::{
     audit::{Audit, Method, Options, audit},
     camera::{Camera, Distortion},
-    correct::{Mirrored, Plan, Sampling, Step, correct},
+    correct::{Mirrored, Plan, Sampling, Step, Which, correct},
     diagnose::{Code, Verdict},
     recording::{Limits, Memory, Recording},
     report::wire,
@@ -71,11 +71,14 @@ fn simulated_faults_go() {
         &["rectified-twice", "depth-shift=3px,0px"],
         &["mirrored"],
         &["depth-mirrored"],
+        &["center=4px,-2px"],
     ] {
         let (simulation, recording) = simulated(group);
         let before = run(&recording);
         assert!(faults(&before).len() >= group.len(), "{group:?}: {:?}", faults(&before));
-        let plan = wire::Audit::from(&before).plan(Sampling::EdgeAware).expect("a way back");
+        let plan = wire::Audit::from(&before)
+            .plan(Which::Faults, Sampling::EdgeAware)
+            .expect("a way back");
         let fixed = applied(&recording, &plan);
         let after = run(&fixed);
         assert_eq!(faults(&after), [], "{group:?}");
@@ -88,7 +91,7 @@ fn simulated_faults_go() {
     }
 }
 
-/// Faults that no finding tells (the bias lies within its tolerance), undone as told.
+/// What is told is undone, without an audit.
 #[test]
 fn told_faults_go() {
     let (simulation, recording) = simulated(&["center=4px,-2px", "depth-bias=2mm"]);
@@ -100,6 +103,24 @@ fn told_faults_go() {
     let was = cloud_error(&simulation, &recording, &before);
     let is = cloud_error(&simulation, &fixed, &after);
     assert!(was > 0.005 && is < 0.001, "{was} before, {is} after");
+}
+
+/// A bias within its tolerance is no fault. It is corrected where that is asked for, as a step or as what is significant.
+#[test]
+fn what_is_significant_goes_when_asked() {
+    let (simulation, recording) = simulated(&["depth-bias=2mm"]);
+    let before = run(&recording);
+    assert_eq!(faults(&before), []);
+    let was = cloud_error(&simulation, &recording, &before);
+    let audit = wire::Audit::from(&before);
+    assert!(audit.plan(Which::Faults, Sampling::EdgeAware).expect("a plan").is_empty());
+    for which in [Which::Significant, Which::Only(&["depth"])] {
+        let plan = audit.plan(which, Sampling::EdgeAware).expect("a plan");
+        let fixed = applied(&recording, &plan);
+        let after = run(&fixed);
+        let is = cloud_error(&simulation, &fixed, &after);
+        assert!(was > 0.003 && is < 0.001, "{which:?}: {was} before, {is} after");
+    }
 }
 
 /// The paper's issue 1 on the published recording of a 4gen iPad: its depth zoomed by 1/0.9507, as ARKit delivers it.
@@ -115,7 +136,8 @@ fn zoomed_depth_of_the_real_ipad_is_found_and_goes() {
     let before = run(&zoomed);
     assert!(faults(&before).contains(&Code::TD401), "{:?}", faults(&before));
     let found = before.registration.as_ref().expect("depth on the board").zoom;
-    let plan = wire::Audit::from(&before).plan(Sampling::EdgeAware).expect("a way back");
+    let plan =
+        wire::Audit::from(&before).plan(Which::Faults, Sampling::EdgeAware).expect("a way back");
     let fixed = applied(&zoomed, &plan);
     let after = run(&fixed);
     assert_eq!(faults(&after), []);

@@ -23,9 +23,18 @@ pub(crate) struct CorrectArgs {
     #[command(flatten)]
     pub(crate) what: WhatArgs,
 
-    /// Take only these steps
+    /// Take only these steps, also where what was found is within the tolerance
+    ///
+    /// Of an audit or a report: what is significant, if not a fault, is corrected by the step that names it.
     #[arg(long, value_name = "STEP", value_delimiter = ',', value_parser = PossibleValuesParser::new(Step::NAMES))]
     pub(crate) only: Vec<String>,
+
+    /// Correct all that is significant, not faults alone
+    ///
+    /// Of an audit or a report: deviations beyond 3 sigma that lie within the tolerance (`info`) as well. Mind that
+    /// a board printed 0.5 % too large looks like depth 0.5 % too short.
+    #[arg(long, conflicts_with = "only")]
+    pub(crate) within_tolerance: bool,
 
     /// How depth is resampled
     #[arg(long, default_value = "edge-aware")]

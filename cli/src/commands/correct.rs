@@ -7,7 +7,7 @@ use std::{
 
 use truedepth::{
     audit::{Method, Options},
-    correct::{Because, Plan, Progress, Sampling, Step, correct_observed},
+    correct::{Because, Plan, Progress, Sampling, Step, Which, correct_observed},
     diagnose::{self, Api, KnownIssue},
     recording::{Recording, Sink, WholeFolder},
     report::{self, wire},
@@ -30,9 +30,15 @@ pub(crate) fn run(args: &CorrectArgs, terminal: &Terminal) -> Result<Outcome, Fa
     let recording = Recording::open(&args.recording, &input::limits(&args.input))?;
     // A folder that must not be written is better known before the work than after.
     let mut sink = WholeFolder::create(&args.output)?;
+    let only: Vec<&str> = args.only.iter().map(String::as_str).collect();
     let asked = Asked {
         path: &args.recording,
         steps: args.what.chosen(),
+        which: match (&only[..], args.within_tolerance) {
+            ([], false) => Which::Faults,
+            ([], true) => Which::Significant,
+            (names, _) => Which::Only(names),
+        },
         sampling: match args.sampling {
             SamplingChoice::EdgeAware => Sampling::EdgeAware,
             SamplingChoice::Nearest => Sampling::Nearest,
@@ -40,11 +46,7 @@ pub(crate) fn run(args: &CorrectArgs, terminal: &Terminal) -> Result<Outcome, Fa
         devices: &args.devices,
         input: &args.input,
     };
-    let (mut plan, findings) = plan(&asked, &recording, terminal)?;
-    if !args.only.is_empty() {
-        let names: Vec<&str> = args.only.iter().map(String::as_str).collect();
-        plan = plan.only(&names);
-    }
+    let (plan, findings) = plan(&asked, &recording, terminal)?;
     if plan.is_empty() && !args.always {
         terminal.say(&format!("{}: nothing to correct; nothing was written", recording.name));
         return Ok(Outcome::Clean);
@@ -73,6 +75,7 @@ pub(super) struct Asked<'a> {
     /// Of this recording.
     pub(super) path: &'a Path,
     pub(super) steps: Steps<'a>,
+    pub(super) which: Which<'a>,
     pub(super) sampling: Sampling,
     pub(super) devices: &'a DevicesArgs,
     pub(super) input: &'a InputArgs,
@@ -86,11 +89,28 @@ pub(super) fn plan(
 ) -> Result<(Plan, Vec<wire::FindingInfo>), Failure> {
     let sampling = asked.sampling;
     let by_audit = |audit: &wire::Audit| -> Result<_, Failure> {
-        let plan = audit.plan(sampling)?;
-        for finding in audit.faults() {
+        let plan = audit.plan(asked.which, sampling)?;
+        let taken = |finding: &&wire::FindingInfo| {
+            plan.steps().iter().any(|(_, because)| because.name() == finding.code)
+        };
+        for finding in audit.findings.iter().filter(taken) {
             terminal.detail(&format!("{}: {}", finding.code, finding.summary));
         }
-        Ok((plan, audit.faults().cloned().collect()))
+        let left = audit.findings.iter().filter(|f| f.correction.is_some() && !taken(f));
+        if asked.which == Which::Faults {
+            for finding in left {
+                terminal.say(&format!(
+                    "left alone, within the tolerance: {}: {} (--within-tolerance corrects it)",
+                    finding.code, finding.summary
+                ));
+            }
+        }
+        let findings = audit.findings.iter().filter(taken).cloned().collect();
+        Ok((plan, findings))
+    };
+    let only = |plan: Plan| match asked.which {
+        Which::Only(names) => plan.only(names),
+        _ => plan,
     };
     match asked.steps {
         Steps::Audit => {
@@ -100,15 +120,16 @@ pub(super) fn plan(
         }
         Steps::With(path) => match input::document(path)? {
             wire::Document::Audit(audit) => by_audit(&audit),
-            _ => Ok((Plan::from_camera(&input::camera(path)?, sampling)?, Vec::new())),
+            _ => Ok((only(Plan::from_camera(&input::camera(path)?, sampling)?), Vec::new())),
         },
         Steps::Faults(faults) => {
             let said = recording.factory().map(|f| f.intrinsics).ok_or_else(|| {
                 Failure::new(format!("{} has no factory metadata", recording.place()))
             })?;
-            Ok((Plan::from_faults(faults.iter().copied(), &said, sampling)?, Vec::new()))
+            let plan = Plan::from_faults(faults.iter().copied(), &said, sampling)?;
+            Ok((only(plan), Vec::new()))
         }
-        Steps::Pair { av, ar } => Ok((by_equations(asked, recording, av, ar)?, Vec::new())),
+        Steps::Pair { av, ar } => Ok((only(by_equations(asked, recording, av, ar)?), Vec::new())),
     }
 }
 

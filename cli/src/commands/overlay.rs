@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use truedepth::{
-    correct::{Plan, Sampling},
+    correct::{Plan, Sampling, Which},
     recording::{Recording, WholeFolder},
     report::{self, After, Animation, DepthPictures, DepthStyle, Drawn, Flip, Range, Shown, wire},
 };
@@ -86,6 +86,7 @@ impl Beside {
         let asked = Asked {
             path: &args.recording,
             steps: chosen,
+            which: Which::Faults,
             sampling: Sampling::EdgeAware,
             devices: &args.devices,
             input: &args.input,

@@ -1,6 +1,6 @@
 //! `truedepth correct`, `inspect`, `compare`: what is written, and what never is.
 
-use std::{fs, process::Command, thread, time::Duration};
+use std::{ffi::OsStr, fs, process::Command, thread, time::Duration};
 
 use crate::{
     scratch::{Scratch, files_of, names},
@@ -59,6 +59,41 @@ fn a_correction_is_a_new_recording_with_provenance() {
     let text = fs::read_to_string(again.join("provenance.json")).unwrap();
     let second: serde_json::Value = serde_json::from_str(&text).unwrap();
     assert_eq!(second["previous"], value);
+}
+
+/// What is significant though within the tolerance is said, and corrected when asked for.
+#[test]
+fn within_the_tolerance_only_when_asked() {
+    let scratch = Scratch::new();
+    let (rec, out) = (scratch.join("rec"), scratch.join("out"));
+    let device = "ipad-12.9-5gen";
+    let simulate = [
+        "simulate",
+        "--device",
+        device,
+        "--fault",
+        "depth-bias=2mm",
+        "--frames",
+        "14",
+        "--seed",
+        "3",
+    ];
+    truedepth(simulate.into_iter().map(OsStr::new).chain(["-o".as_ref(), rec.as_os_str()])).code(0);
+    let report = scratch.join("report");
+    let as_text = |path: &std::path::Path| path.to_str().expect("a plain name").to_owned();
+    truedepth(["audit", &as_text(&rec), "-o", &as_text(&report)]).code(0);
+    let json = as_text(&report.join("report.json"));
+    let correct = |more: &[&str]| {
+        let (rec, out) = (as_text(&rec), as_text(&out));
+        let words = ["correct", &rec, "-o", &out, "--with", &json];
+        truedepth(words.iter().chain(more).map(|word| (*word).to_owned()))
+    };
+    correct(&[]).code(0).says(&["TD302", "--within-tolerance", "nothing to correct"]);
+    correct(&["--only", "center"]).code(0).says(&["nothing to correct"]);
+    assert!(!out.exists());
+    correct(&["--only", "depth", "--within-tolerance"]).code(2);
+    let run = correct(&["--within-tolerance"]).code(0);
+    assert!(run.stdout.contains("bias_mm") && run.stdout.contains("TD302"), "{}", run.stdout);
 }
 
 #[test]

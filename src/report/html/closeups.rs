@@ -7,8 +7,8 @@ use crate::{
     audit::{Audit, FrameAudit},
     calibrate::Estimate,
     camera::{Camera, Distortion},
+    correct::{Mirrored, Plan, Sampling, Which},
     depth::{BoardDepth, MAX_ERROR_M},
-    diagnose::{Correction, Verdict},
     geom::{Board, Color, Pixel, Pose},
     pose::View,
     report::{
@@ -95,26 +95,22 @@ struct Corrected {
 impl Corrected {
     const NOTHING: Self = Self { scale: 1.0, bias_m: 0.0, moved: None, mirrored: false };
 
-    /// As `truedepth correct` would: by the corrections that the faults name.
+    /// What `truedepth correct` would do; nothing where it would find no way.
     fn of(audit: &Audit, center_px: [f64; 2]) -> Self {
-        let mut all = Self::NOTHING;
-        let nowhere = Moved { mirrored: false, zoom: 1.0, shift_px: [0.0; 2], center_px };
-        let faults = audit.findings.iter().filter(|f| f.verdict == Verdict::Fault);
-        for correction in faults.filter_map(|f| f.correction.as_ref()) {
-            match *correction {
-                Correction::Depth { scale, bias_m } => (all.scale, all.bias_m) = (scale, bias_m),
-                // Zoom and shift are findings of their own, each with the other left alone.
-                Correction::Align { zoom, shift_px } => {
-                    let moved = all.moved.get_or_insert(nowhere);
-                    moved.zoom *= zoom;
-                    moved.shift_px = [0, 1].map(|axis| moved.shift_px[axis] + shift_px[axis]);
-                }
-                Correction::UnmirrorDepth => all.moved.get_or_insert(nowhere).mirrored = true,
-                Correction::Unmirror => all.mirrored = true,
-                _ => {}
-            }
+        let (state, camera) = (audit.distortion_state, audit.camera.as_ref());
+        let plan =
+            Plan::from_findings(&audit.findings, state, camera, Which::Faults, Sampling::EdgeAware);
+        let Ok(plan) = plan else { return Self::NOTHING };
+        let ([zoom, _], shift_px) = (plan.zoom(), plan.shift_px());
+        let mirrored = plan.unmirror() == Some(Mirrored::Depth);
+        let moves = mirrored || zoom != 1.0 || shift_px != [0.0; 2];
+        let (scale, bias_m) = plan.line();
+        Self {
+            scale,
+            bias_m,
+            moved: moves.then_some(Moved { mirrored, zoom, shift_px, center_px }),
+            mirrored: plan.unmirror() == Some(Mirrored::Both),
         }
-        all
     }
 
     fn words(&self) -> String {

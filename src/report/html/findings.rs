@@ -202,6 +202,13 @@ fn list(audit: &Audit, findings: &[&Finding]) -> Markup {
                                     @if !finding.what_to_do.is_empty() { " " (prose(&finding.what_to_do)) }
                                 }
                             }
+                            @if let Some(correction) = &finding.correction {
+                                p class="correction" {
+                                    strong { "The correction. " }
+                                    (words::unbroken(&correction_words(correction)))
+                                    " Made only with " code { "--within-tolerance" } "."
+                                }
+                            }
                             (evidence(audit, finding))
                         }
                     }

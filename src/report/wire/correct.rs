@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 use super::{Audit, FindingInfo, finite};
 use crate::{
     camera::{Camera, Intrinsics},
-    correct::{self, Because, Corrected, Lens, Mirrored, Plan, Sampling, Step},
-    diagnose::{self, Code, DistortionState},
+    correct::{self, Because, Called, Corrected, Lens, Mirrored, Plan, Sampling, Step, Which},
+    diagnose::{Code, DistortionState, Verdict},
     recording::Recording,
     report::Error,
 };
@@ -155,18 +155,18 @@ impl From<&Intrinsics> for PinholeInfo {
 impl Audit {
     /// The findings that are faults.
     pub fn faults(&self) -> impl Iterator<Item = &FindingInfo> {
-        self.findings.iter().filter(|f| f.severity == diagnose::Verdict::Fault.name())
+        self.findings.iter().filter(|f| f.severity == Verdict::Fault.name())
     }
 
-    /// The plan that the faults of this audit call for.
+    /// The plan that this audit calls for.
     ///
     /// Errors: a finding of a newer version, a camera that cannot be, a fault that names no way back.
-    pub fn plan(&self, sampling: Sampling) -> Result<Plan, Error> {
+    pub fn plan(&self, which: Which<'_>, sampling: Sampling) -> Result<Plan, Error> {
         let camera = self.calibration.as_ref().map(|c| c.camera()).transpose()?;
         let has_tables = self.device.factory.is_some_and(|factory| factory.has_tables);
         let unusable = |e: correct::Error| Error::Document(e.to_string());
-        let mut steps = Vec::new();
-        for finding in self.faults() {
+        let mut called = Vec::new();
+        for finding in &self.findings {
             let Some(correction) = &finding.correction else { continue };
             let code: Code = finding.code.parse().map_err(|e| Error::Document(format!("{e}")))?;
             let number = |name: &str| {
@@ -174,7 +174,7 @@ impl Audit {
                     Error::Document(format!("{code}: its correction lacks `{name}`"))
                 })
             };
-            let called = match correction.kind.as_str() {
+            let steps = match correction.kind.as_str() {
                 "focal" => vec![Step::Focal { focal_px: number("focal_px")? }],
                 "principal_point" => vec![Step::Center {
                     center_px: [number("center_x_px")?, number("center_y_px")?],
@@ -200,12 +200,13 @@ impl Audit {
                     )));
                 }
             };
-            steps.extend(called.into_iter().map(|step| (step, Because::Finding(code))));
+            // Before version 0.2 only faults named a correction.
+            let is_fault = finding.severity == Verdict::Fault.name();
+            let verdict = if is_fault { Verdict::Fault } else { Verdict::Info };
+            called.push(Called { code, verdict, steps });
         }
-        if self.distortion_state == DistortionState::RectifiedTwice.name() {
-            let twice = Step::Undistort(Lens::OwnTablesTwice);
-            steps.push((twice, Because::Finding(Code::TD204)));
-        }
-        Plan::merged(steps, sampling).map_err(unusable)
+        let state = self.distortion_state == DistortionState::RectifiedTwice.name();
+        let state = if state { DistortionState::RectifiedTwice } else { DistortionState::Unknown };
+        Plan::called_for(called, state, which, sampling).map_err(unusable)
     }
 }

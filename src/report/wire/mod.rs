@@ -103,7 +103,7 @@ mod tests {
     use super::*;
     use crate::{
         camera::{self, Brown, RadialTable, TablePair},
-        correct::{Because, BoardLine, Plan, Rectifier, Sampling, Step},
+        correct::{Because, BoardLine, Plan, Rectifier, Sampling, Step, Which},
         detect::Observation,
         diagnose,
         geom::Pixel,
@@ -161,7 +161,7 @@ mod tests {
     fn correct() {
         let recording = sample::recording();
         let audit = Audit::from(&sample::audit());
-        let mut plan = audit.plan(Sampling::EdgeAware).unwrap();
+        let mut plan = audit.plan(Which::Faults, Sampling::EdgeAware).unwrap();
         assert_eq!(plan.steps().len(), 1, "{plan:?}");
         let mut steps = plan.steps().to_vec();
         steps.push((Step::DepthZoom { zoom: [0.95; 2] }, Because::Told));
