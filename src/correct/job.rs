@@ -80,28 +80,33 @@ pub fn correct_observed<S: Sink>(
     };
     let corrector = Corrector::new(recording, plan)?;
     let total = recording.frames.len();
-    let mut hashes = Vec::new();
+    // All that grows with the number of files, in one piece: images come and go, and what is kept between them would
+    // leave holes too small for the next.
+    let names = recording.file_names();
+    let mut hashes: Vec<Option<[u8; 32]>> = vec![None; names.len()];
+    let slot = |name: &str| names.binary_search(&name).expect("files of the recording are listed");
     let mut n_depths = [0; 2];
     // Batches bound the memory, whatever the number of frames.
     const BATCH: usize = 16;
-    let indices: Vec<usize> = (0..total).collect();
-    for batch in indices.chunks(BATCH) {
-        let one = |&index: &usize| corrector.frame(index);
+    for first in (0..total).step_by(BATCH) {
+        let batch = first..total.min(first + BATCH);
+        let end = batch.end;
+        let one = |index: usize| corrector.frame(index);
         #[cfg(feature = "parallel")]
-        let done: Vec<Result<Vec<Output>, Error>> = {
-            use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
-            batch.par_iter().map(one).collect()
+        let done: Vec<Result<Vec<Output<'_>>, Error>> = {
+            use rayon::prelude::{IntoParallelIterator, ParallelIterator};
+            batch.into_par_iter().map(one).collect()
         };
         #[cfg(not(feature = "parallel"))]
-        let done: Vec<Result<Vec<Output>, Error>> = batch.iter().map(one).collect();
+        let done: Vec<Result<Vec<Output<'_>>, Error>> = batch.map(one).collect();
         for outputs in done {
             for output in outputs? {
-                sink.write(&output.hash.name, &output.bytes)?;
+                sink.write(output.name, &output.bytes)?;
                 n_depths = [0, 1].map(|i| n_depths[i] + output.n_depths[i]);
-                hashes.push(output.hash);
+                hashes[slot(output.name)] = Some(output.hash);
             }
         }
-        observer(Progress { done: batch[batch.len() - 1] + 1, total });
+        observer(Progress { done: end, total });
     }
     let amendment = |timestamp| {
         let frame = recording.frame_at(timestamp);
@@ -114,18 +119,16 @@ pub fn correct_observed<S: Sink>(
         }
     };
     for name in recording.metadata_names() {
-        hashes.push(hash_of_file(recording, name)?);
+        hashes[slot(name)] = Some(hash_of_file(recording, name)?);
         sink.stream(name, &mut |push| recording.amended_metadata(name, &amendment, push))?;
     }
     let mut left_out = Vec::new();
     let mut previous = None;
-    hashes.sort_unstable_by(|a, b| a.name.cmp(&b.name));
-    let n_written = hashes.len();
-    for name in recording.file_names() {
-        if hashes[..n_written].binary_search_by(|hash| hash.name.as_str().cmp(name)).is_ok() {
+    for (&name, hash) in names.iter().zip(&mut hashes) {
+        if hash.is_some() {
             continue;
         }
-        hashes.push(hash_of_file(recording, name)?);
+        *hash = Some(hash_of_file(recording, name)?);
         if name == PROVENANCE {
             previous = Some(recording.file(name)?);
         } else if recording.is_image_name(name) {
@@ -134,14 +137,18 @@ pub fn correct_observed<S: Sink>(
             sink.stream(name, &mut |push| recording.pieces(name, push))?;
         }
     }
-    hashes.sort_unstable_by(|a, b| a.name.cmp(&b.name));
+    let files: Vec<FileHash> = names
+        .iter()
+        .zip(hashes.iter().flatten())
+        .map(|(name, hash)| FileHash { name: (*name).to_owned(), sha256: hexadecimal(hash) })
+        .collect();
     let mut all = Sha256::new();
-    for FileHash { name, sha256 } in &hashes {
+    for FileHash { name, sha256 } in &files {
         all.update(format!("{sha256}  {name}\n"));
     }
     Ok(Corrected {
         input_sha256: hexadecimal(&all.finalize()),
-        files: hashes,
+        files,
         left_out,
         before: reference,
         after: recording.factory().and_then(amended),
@@ -151,17 +158,13 @@ pub fn correct_observed<S: Sink>(
     })
 }
 
-fn hash_of(name: &str, bytes: &[u8]) -> FileHash {
-    FileHash { name: name.to_owned(), sha256: hexadecimal(&Sha256::digest(bytes)) }
-}
-
-fn hash_of_file(recording: &Recording, name: &str) -> Result<FileHash, Error> {
+fn hash_of_file(recording: &Recording, name: &str) -> Result<[u8; 32], Error> {
     let mut hash = Sha256::new();
     recording.pieces(name, &mut |bytes| {
         hash.update(bytes);
         Ok(())
     })?;
-    Ok(FileHash { name: name.to_owned(), sha256: hexadecimal(&hash.finalize()) })
+    Ok(hash.finalize().into())
 }
 
 fn hexadecimal(digest: &[u8]) -> String {
@@ -169,8 +172,10 @@ fn hexadecimal(digest: &[u8]) -> String {
 }
 
 /// A file to write in place of one that was read.
-struct Output {
-    hash: FileHash,
+struct Output<'a> {
+    name: &'a str,
+    /// Of what was read.
+    hash: [u8; 32],
     bytes: Vec<u8>,
     /// Depth measurements before and after.
     n_depths: [u64; 2],
@@ -259,19 +264,19 @@ impl<'a> Corrector<'a> {
     }
 
     /// The files of one frame.
-    fn frame(&self, index: usize) -> Result<Vec<Output>, Error> {
+    fn frame(&self, index: usize) -> Result<Vec<Output<'_>>, Error> {
         let (recording, plan) = (self.recording, self.plan);
         let source = &recording.frames[index];
         let mut outputs = Vec::new();
         if let Some(name) = &source.color {
             let read = recording.file(name)?;
-            let hash = hash_of(name, &read);
+            let hash = Sha256::digest(&read).into();
             let bytes = if plan.changes_color() { self.color(index)?.to_png() } else { read };
-            outputs.push(Output { hash, bytes, n_depths: [0; 2] });
+            outputs.push(Output { name, hash, bytes, n_depths: [0; 2] });
         }
         if let Some(name) = &source.depth {
             let read = recording.file(name)?;
-            let hash = hash_of(name, &read);
+            let hash = Sha256::digest(&read).into();
             if plan.changes_depth() {
                 let map = recording.depth(index)?;
                 let count =
@@ -279,9 +284,9 @@ impl<'a> Corrector<'a> {
                 let before = count(&map);
                 let map = self.correct_depth(index, map)?;
                 let n_depths = [before, count(&map)];
-                outputs.push(Output { hash, bytes: encode_depth(&map), n_depths });
+                outputs.push(Output { name, hash, bytes: encode_depth(&map), n_depths });
             } else {
-                outputs.push(Output { hash, bytes: read, n_depths: [0; 2] });
+                outputs.push(Output { name, hash, bytes: read, n_depths: [0; 2] });
             }
         }
         Ok(outputs)

@@ -94,21 +94,24 @@ impl ColorWarp {
         let mut out = vec![[0u8; 3]; self.width * self.height];
         let source = image.pixels().as_flattened();
         let result = out.as_flattened_mut();
-        vectorized(#[inline(always)] || {
-            let mut at = 0;
-            for run in &self.runs {
-                let n = 3 * run.n as usize;
-                let (to, from) = (3 * run.to as usize, 3 * run.from as usize);
-                let below = from + 3 * self.width;
-                blend(
-                    &mut result[to..to + n],
-                    [&source[from..from + n + 3], &source[below..below + n + 3]],
-                    &self.fx[at..at + n],
-                    &self.fy[at..at + n],
-                );
-                at += n;
-            }
-        });
+        vectorized(
+            #[inline(always)]
+            || {
+                let mut at = 0;
+                for run in &self.runs {
+                    let n = 3 * run.n as usize;
+                    let (to, from) = (3 * run.to as usize, 3 * run.from as usize);
+                    let below = from + 3 * self.width;
+                    blend(
+                        &mut result[to..to + n],
+                        [&source[from..from + n + 3], &source[below..below + n + 3]],
+                        &self.fx[at..at + n],
+                        &self.fy[at..at + n],
+                    );
+                    at += n;
+                }
+            },
+        );
         Rgb::new(self.width, self.height, out)
     }
 }
@@ -191,21 +194,24 @@ impl DepthWarp {
         assert_eq!([depth.width(), depth.height()], [self.width, self.height], "size of the map");
         let source = depth.depth_m();
         let mut out = vec![f32::NAN; self.width * self.height];
-        vectorized(#[inline(always)] || {
-            let mut at = 0;
-            for run in &self.runs {
-                let n = run.n as usize;
-                let (to, from) = (run.to as usize, run.from as usize);
-                let below = from + self.width;
-                join(
-                    &mut out[to..to + n],
-                    [&source[from..from + n + 1], &source[below..below + n + 1]],
-                    &self.fx[at..at + n],
-                    &self.fy[at..at + n],
-                );
-                at += n;
-            }
-        });
+        vectorized(
+            #[inline(always)]
+            || {
+                let mut at = 0;
+                for run in &self.runs {
+                    let n = run.n as usize;
+                    let (to, from) = (run.to as usize, run.from as usize);
+                    let below = from + self.width;
+                    join(
+                        &mut out[to..to + n],
+                        [&source[from..from + n + 1], &source[below..below + n + 1]],
+                        &self.fx[at..at + n],
+                        &self.fy[at..at + n],
+                    );
+                    at += n;
+                }
+            },
+        );
         DepthMap::new(self.width, self.height, out)
     }
 }

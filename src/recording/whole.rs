@@ -21,7 +21,6 @@ pub struct WholeFolder {
     partial: PathBuf,
     /// Held as long as this process is at work: a partial folder whose lock is free is nobody's.
     lock: Option<File>,
-    files: Vec<PathBuf>,
 }
 
 const LOCK: &str = ".lock";
@@ -51,7 +50,7 @@ impl WholeFolder {
                 Ok(()) => Some(Ok(partial)),
             })
             .unwrap_or_else(|| Err(fail("too many runs are writing it; wait for them")))?;
-        let mut folder = Self { target: target.to_owned(), partial, lock: None, files: Vec::new() };
+        let mut folder = Self { target: target.to_owned(), partial, lock: None };
         let lock = folder.partial.join(LOCK);
         let file = File::create_new(&lock).map_err(|e| file_error(&lock, &e))?;
         // Where the file system knows no locks, leftovers stay.
@@ -62,11 +61,7 @@ impl WholeFolder {
 
     /// Brings everything to the disk and gives the folder its name.
     pub fn commit(mut self) -> Result<(), Error> {
-        for path in &self.files {
-            // Writing has begun long ago; this waits for the rest of it.
-            File::open(path).and_then(|file| file.sync_all()).map_err(|e| file_error(path, &e))?;
-        }
-        sync_folder(&self.partial).map_err(|e| file_error(&self.partial, &e))?;
+        sync_all(&self.partial)?;
         refuse_unless_free(&self.target)?;
         if cfg!(windows) && self.target.exists() {
             fs::remove_dir(&self.target).map_err(|e| file_error(&self.target, &e))?;
@@ -102,17 +97,30 @@ impl WholeFolder {
 impl Sink for WholeFolder {
     fn write(&mut self, name: &str, bytes: &[u8]) -> Result<(), Error> {
         let path = self.place(name)?;
-        fs::write(&path, bytes).map_err(|e| file_error(&path, &e))?;
-        self.files.push(path);
-        Ok(())
+        fs::write(&path, bytes).map_err(|e| file_error(&path, &e))
     }
 
     fn stream(&mut self, name: &str, fill: &mut Fill<'_>) -> Result<(), Error> {
-        let path = self.place(name)?;
-        fill_file(&path, fill)?;
-        self.files.push(path);
-        Ok(())
+        fill_file(&self.place(name)?, fill)
     }
+}
+
+/// Brings a folder and all in it to the disk. They are listed instead of remembered: there may be many.
+fn sync_all(folder: &Path) -> Result<(), Error> {
+    let fail = |e| file_error(folder, &e);
+    for entry in fs::read_dir(folder).map_err(fail)? {
+        let entry = entry.map_err(fail)?;
+        let path = entry.path();
+        if entry.file_type().map_err(fail)?.is_dir() {
+            sync_all(&path)?;
+        } else {
+            // Writing has begun long ago; this waits for the rest of it.
+            File::open(&path)
+                .and_then(|file| file.sync_all())
+                .map_err(|e| file_error(&path, &e))?;
+        }
+    }
+    sync_folder(folder).map_err(fail)
 }
 
 impl Drop for WholeFolder {

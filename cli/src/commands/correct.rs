@@ -56,7 +56,7 @@ pub(crate) fn run(args: &CorrectArgs, terminal: &Terminal) -> Result<Outcome, Fa
         bar.set_position(done as u64);
     })?;
     bar.finish_and_clear();
-    let document = wire::Correct::new(&recording, &plan, &done, findings);
+    let document = wire::Correct::new(&recording, &plan, done, findings);
     let words = words(&document, &args.output);
     let json = report::to_json(&wire::Document::Correct(Box::new(document)));
     sink.write(PROVENANCE, json.as_bytes())?;

@@ -74,7 +74,7 @@ impl Correct {
     pub fn new(
         recording: &Recording,
         plan: &Plan,
-        done: &Corrected,
+        done: Corrected,
         findings: Vec<FindingInfo>,
     ) -> Self {
         let previous = done.previous.as_ref().map(|bytes| {
@@ -84,16 +84,16 @@ impl Correct {
         Self {
             recording: recording.name.clone(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
-            input_sha256: done.input_sha256.clone(),
+            input_sha256: done.input_sha256,
             steps: plan.steps().iter().map(StepInfo::from).collect(),
             depth_sampling: plan.sampling().name().to_owned(),
             factory_before: done.before.as_ref().map(PinholeInfo::from),
             factory_after: done.after.as_ref().map(PinholeInfo::from),
             n_frames: done.n_frames,
             n_depths: done.n_depths,
-            left_out: done.left_out.clone(),
+            left_out: done.left_out,
             findings,
-            files: done.files.iter().map(|f| (f.name.clone(), f.sha256.clone())).collect(),
+            files: done.files.into_iter().map(|f| (f.name, f.sha256)).collect(),
             previous,
         }
     }

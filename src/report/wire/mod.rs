@@ -169,7 +169,7 @@ mod tests {
         let mut sink = Memory::new("fixed");
         let done = crate::correct::correct(&recording, &plan, &mut sink).unwrap();
         let faults = audit.faults().cloned().collect();
-        let mut document = Correct::new(&recording, &plan, &done, faults);
+        let mut document = Correct::new(&recording, &plan, done, faults);
         // How a PNG is compressed is the encoder's affair.
         document.files.values_mut().for_each(|hash| hash.replace_range(8.., "..."));
         document.input_sha256.replace_range(.., "...");
