@@ -13,6 +13,7 @@ use crate::{
     },
     detect::{Corner, Observation},
     diagnose::{Case, Device, diagnose},
+    geom::Pixel,
     image::DepthMap,
     pose::{View, Weighting},
     recording::{Factory, Problem},
@@ -143,11 +144,29 @@ pub(super) fn conclude(
     let pairs = own.views_with_depth(&frames);
     let registration = own.camera.as_ref().and_then(|camera| {
         let calibration = own.calibration.as_ref();
-        register(&RegisterInput { board: &board, camera, calibration, views: &pairs })
+        let tables = factory.and_then(|f| f.tables.as_ref());
+        let pinhole = Camera { intrinsics: camera.intrinsics, distortion: Distortion::None };
+        let other = |at: Pixel| match (&camera.distortion, tables) {
+            // The colour image is distorted: a rectified depth map shows where the lens puts its pixels.
+            (Distortion::Brown(_) | Distortion::Table(_), _) => {
+                camera.project_ray(pinhole.unproject(at)?)
+            }
+            (Distortion::None, Some(tables)) => tables.undistort(at),
+            (Distortion::None, None) => None,
+        };
+        let known = camera.distortion != Distortion::None || tables.is_some();
+        register(&RegisterInput {
+            board: &board,
+            camera,
+            calibration,
+            views: &pairs,
+            other_state: if known { Some(&other) } else { None },
+        })
     });
     let distortion = own.distortion(ground, &board, &frames);
     let handedness = (!pairs.is_empty()).then(|| handedness(&board, own.surface(), &pairs));
     drop(pairs);
+    let lens_share = registration.as_ref().and_then(|r| r.lens_share);
     let (findings, distortion_state) = diagnose(&Case {
         problems: ground.problems,
         n_frames,
@@ -169,6 +188,7 @@ pub(super) fn conclude(
         handedness,
         tolerances: options.tolerances,
     });
+    let depth_distortion_state = distortion_state.of_depth(lens_share);
     observer(Progress { stage: Stage::Judge, done: 1, total: 1 });
     Ok(Audit {
         name: ground.name.to_owned(),
@@ -188,6 +208,7 @@ pub(super) fn conclude(
         handedness,
         distortion,
         distortion_state,
+        depth_distortion_state,
         findings,
     })
 }

@@ -57,6 +57,8 @@ pub struct Audit {
     pub distortion: Option<DistortionTest>,
     /// Whether the stream still carries the lens' distortion.
     pub distortion_state: DistortionState,
+    /// The same of the depth maps, which may be resampled without the colour images.
+    pub depth_distortion_state: DistortionState,
     /// What follows, by code.
     pub findings: Vec<Finding>,
 }

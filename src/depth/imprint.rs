@@ -1,6 +1,8 @@
 //! The print, seen in the depth map: a second witness of zoom and shift.
 
-use nalgebra::{Matrix2, Matrix3, Matrix4, Vector2, Vector3, Vector4};
+use nalgebra::{Matrix2, Matrix3, Matrix4, Matrix5, Vector2, Vector3, Vector4, Vector5};
+
+use super::{rays::RayGrid, register::LensPlace};
 
 use crate::{
     board::{CharucoBoard, Layout},
@@ -33,6 +35,8 @@ pub struct Imprint {
 /// What the choice of the neighbourhood moves zoom and shift (px) by: on the published recordings, 25 or 65 pixels
 /// instead of 45 change them by so much, in no one direction. Leaving out frames does not tell of it.
 const NEIGHBOURHOOD_SIGMA: [f64; 3] = [0.0015, 0.25, 0.25];
+/// The same for the share of the other distortion state, of lenses that bend by some pixels.
+const NEIGHBOURHOOD_SIGMA_LENS: f64 = 0.1;
 
 /// The print's contrast must stand out of the noise by so much; the place is a ratio to it, biased and skewed where it
 /// does not (by 1/this² of itself).
@@ -42,6 +46,7 @@ const MAX_STEPS: usize = 8;
 /// Steps below these are the last: a tenth of the best σ.
 const SMALL_STEP_PX: f64 = 0.02;
 const SMALL_STEP_ZOOM: f64 = 1e-4;
+const SMALL_STEP_LENS: f64 = 0.01;
 /// Fewer frames tell no σ.
 const LEAST_FRAMES: usize = 5;
 /// A frame with fewer cells says nothing.
@@ -306,10 +311,11 @@ pub(super) struct Spot {
     pub(super) depth_m: f64,
 }
 
-/// A frame's normal equations: contrast (metres), and contrast times what zoom and shift are off.
+/// A frame's normal equations: contrast (metres), and contrast times what zoom, shift and the share of the other
+/// distortion state are off.
 struct Normal {
-    information: Matrix4<f64>,
-    score: Vector4<f64>,
+    information: Matrix5<f64>,
+    score: Vector5<f64>,
 }
 
 impl Normal {
@@ -319,6 +325,7 @@ impl Normal {
         texture: &Texture,
         place: &Place,
         look: impl Fn(Pixel) -> Option<Spot>,
+        lens: Option<&RayGrid>,
     ) -> Option<Self> {
         let n = texture.rough.len();
         let spots: Vec<Option<Spot>> = (0..n)
@@ -332,22 +339,24 @@ impl Normal {
         let blur_px = SENSOR_BLUR_PX.hypot(texture.cell_px as f64 / 12.0_f64.sqrt());
         let level = print.level(blur_px * scale / f64::from(n_spots.max(1)));
         // Darkness and its derivatives, as depth: what is measured too far by d has an inverse depth less by d/z².
-        let seen: Vec<Option<[f64; 4]>> = (0..n)
+        let seen: Vec<Option<[f64; 5]>> = (0..n)
             .map(|k| {
                 let spot = spots[k].as_ref()?;
                 let (darkness, by_board) = print.at(level, &spot.on_board_m)?;
                 let by_pixel = spot.by_pixel.transpose() * by_board;
                 let by_zoom = by_pixel.dot(&place.off_center(texture.at(k)));
                 let by_shift = -place.zoom * by_pixel;
+                let lens = lens.and_then(|grid| grid.at(place.looked_at(texture.at(k))));
+                let by_lens = lens.map_or(0.0, |([x, y], _)| by_pixel.dot(&Vector2::new(x, y)));
                 let curvature = -1.0 / (spot.depth_m * spot.depth_m);
-                Some([darkness, by_zoom, by_shift.x, by_shift.y].map(|d| d * curvature))
+                Some([darkness, by_zoom, by_shift.x, by_shift.y, by_lens].map(|d| d * curvature))
             })
             .collect();
         let sums = Sums::new(texture.columns, seen.iter().copied());
         let mut rows = Vec::with_capacity(n);
         for k in 0..n {
             let Some((here, (mean, true))) = seen[k].zip(sums.mean(k)) else { continue };
-            let row = Vector4::from_fn(|c, _| here[c] - mean[c]);
+            let row = Vector5::from_fn(|c, _| here[c] - mean[c]);
             rows.push((f64::from(texture.rough[k]) * UNIT_PER_M, row));
         }
         let residuals: Vec<f64> = rows.iter().map(|(residual, _)| *residual).collect();
@@ -355,7 +364,7 @@ impl Normal {
         if rows.len() < LEAST_CELLS || !(sigma > 0.0) {
             return None;
         }
-        let mut normal = Self { information: Matrix4::zeros(), score: Vector4::zeros() };
+        let mut normal = Self { information: Matrix5::zeros(), score: Vector5::zeros() };
         for (residual, row) in rows {
             let u = residual / (TUKEY * sigma);
             if u.abs() < 1.0 {
@@ -374,10 +383,12 @@ pub(super) struct Place {
     pub(super) center: Pixel,
     pub(super) zoom: f64,
     pub(super) shift_px: [f64; 2],
+    /// Share of the other distortion state.
+    pub(super) lens: f64,
 }
 
 impl Place {
-    /// Where a pixel of the depth map looks in the colour image.
+    /// Where a pixel of the depth map looks in the colour image, but for the other distortion state.
     pub(super) fn looked_at(&self, at: Pixel) -> Pixel {
         let from = self.off_center(at);
         Pixel::new(self.center.x + self.zoom * from.x, self.center.y + self.zoom * from.y)
@@ -390,9 +401,86 @@ impl Place {
 }
 
 /// What these frames' normal equations say: contrast, and what zoom and shift are off.
-fn solve(information: &Matrix4<f64>, score: &Vector4<f64>) -> Option<(f64, Vector3<f64>)> {
-    let solved = information.cholesky()?.solve(score);
+fn solve(information: &Matrix5<f64>, score: &Vector5<f64>) -> Option<(f64, Vector3<f64>)> {
+    let information = information.fixed_view::<4, 4>(0, 0).into_owned();
+    let solved = information.cholesky()?.solve(&score.fixed_rows::<4>(0).into_owned());
     Some((solved[0], solved.fixed_rows::<3>(1) / solved[0]))
+}
+
+/// What zoom, shift and the share of the other state are off, together.
+fn solve_lens(information: &Matrix5<f64>, score: &Vector5<f64>) -> Option<Vector4<f64>> {
+    let solved = information.cholesky()?.solve(score);
+    Some(solved.fixed_rows::<4>(1) / solved[0])
+}
+
+/// Zoom, shift and share together, from the best place on; `None` where they are not determined.
+fn find_lens(look: &Looks<'_>, start: Place) -> Option<LensPlace> {
+    let (place, normals) = look.converge(start, true)?;
+    let (information, score) = total(&normals);
+    let off = solve_lens(&information, &score)?;
+    let mut covariance = Matrix4::zeros();
+    let n = normals.len() as f64;
+    for normal in &normals {
+        let without = solve_lens(&(information - normal.information), &(score - normal.score))?;
+        let change = without - off;
+        covariance.ger((n - 1.0) / n, &change, &change, 1.0);
+    }
+    for (k, sigma) in NEIGHBOURHOOD_SIGMA.into_iter().chain([NEIGHBOURHOOD_SIGMA_LENS]).enumerate()
+    {
+        covariance[(k, k)] += sigma * sigma;
+    }
+    let [dx, dy] = place.shift_px;
+    Some((Vector4::new(place.zoom, dx, dy, place.lens), covariance))
+}
+
+/// What is looked at.
+struct Looks<'a> {
+    print: &'a Print,
+    textures: &'a [&'a Texture],
+    spot: &'a (dyn Fn(usize, &Place, Pixel) -> Option<Spot> + Sync),
+    lens: Option<&'a RayGrid>,
+}
+
+impl Looks<'_> {
+    /// The best place and the normal equations there, from one that is right within half a square.
+    fn converge(&self, start: Place, with_lens: bool) -> Option<(Place, Vec<Normal>)> {
+        let mut place = start;
+        let mut normals: Vec<Normal> = Vec::new();
+        for _ in 0..MAX_STEPS {
+            let one = |i: usize| {
+                let spot = |pixel| (self.spot)(i, &place, pixel);
+                Normal::new(self.print, self.textures[i], &place, spot, self.lens)
+            };
+            // Collected in order of frames, whatever the threads did.
+            #[cfg(feature = "parallel")]
+            let each: Vec<Option<Normal>> = {
+                use rayon::prelude::{IntoParallelIterator, ParallelIterator};
+                (0..self.textures.len()).into_par_iter().map(one).collect()
+            };
+            #[cfg(not(feature = "parallel"))]
+            let each: Vec<Option<Normal>> = (0..self.textures.len()).map(one).collect();
+            normals = each.into_iter().flatten().collect();
+            let (information, score) = total(&normals);
+            let off = match with_lens {
+                true => solve_lens(&information, &score)?,
+                false => solve(&information, &score)?.1.push(0.0),
+            };
+            // A step longer than an edge is wide would leave what is linear.
+            let longest =
+                (off.y.hypot(off.z) / 3.0).max(off.x.abs() / 0.02).max(off.w.abs() / 0.5).max(1.0);
+            place.zoom += off.x / longest;
+            place.shift_px[0] += off.y / longest;
+            place.shift_px[1] += off.z / longest;
+            place.lens += off.w / longest;
+            let is_small = off.y.hypot(off.z) < SMALL_STEP_PX
+                && off.x.abs() < SMALL_STEP_ZOOM
+                && off.w.abs() < SMALL_STEP_LENS;
+            if is_small {
+                break;
+            }
+        }
+        Some((place, normals))
+    }
 }
 
 /// Finds contrast and place, starting from a place that is right within half a square. `look` tells where a pixel of
@@ -402,32 +490,10 @@ pub(super) fn find(
     start: Place,
     textures: &[&Texture],
     look: impl Fn(usize, &Place, Pixel) -> Option<Spot> + Sync,
-) -> Option<Imprint> {
-    let mut place = start;
-    let mut normals: Vec<Normal> = Vec::new();
-    for _ in 0..MAX_STEPS {
-        let one =
-            |i: usize| Normal::new(print, textures[i], &place, |pixel| look(i, &place, pixel));
-        // Collected in order of frames, whatever the threads did.
-        #[cfg(feature = "parallel")]
-        let each: Vec<Option<Normal>> = {
-            use rayon::prelude::{IntoParallelIterator, ParallelIterator};
-            (0..textures.len()).into_par_iter().map(one).collect()
-        };
-        #[cfg(not(feature = "parallel"))]
-        let each: Vec<Option<Normal>> = (0..textures.len()).map(one).collect();
-        normals = each.into_iter().flatten().collect();
-        let (information, score) = total(&normals);
-        let (_, off) = solve(&information, &score)?;
-        // A step longer than an edge is wide would leave what is linear.
-        let longest = (off.y.hypot(off.z) / 3.0).max(off.x.abs() / 0.02).max(1.0);
-        place.zoom += off.x / longest;
-        place.shift_px[0] += off.y / longest;
-        place.shift_px[1] += off.z / longest;
-        if off.y.hypot(off.z) < SMALL_STEP_PX && off.x.abs() < SMALL_STEP_ZOOM {
-            break;
-        }
-    }
+    lens: Option<&RayGrid>,
+) -> Option<(Imprint, Option<LensPlace>)> {
+    let looks = Looks { print, textures, spot: &look, lens };
+    let (place, normals) = looks.converge(start, false)?;
     let n = normals.len();
     if n < LEAST_FRAMES {
         return None;
@@ -451,17 +517,19 @@ pub(super) fn find(
         covariance[(k, k)] += sigma * sigma;
     }
     let estimate = |k: usize, value: f64| Estimate { value, sigma: covariance[(k, k)].sqrt() };
-    Some(Imprint {
+    let of_lens = lens.and_then(|_| find_lens(&looks, place));
+    let imprint = Imprint {
         zoom: estimate(0, place.zoom),
         shift_px: [1, 2].map(|k| estimate(k, place.shift_px[k - 1])),
         covariance: std::array::from_fn(|i| std::array::from_fn(|j| covariance[(i, j)])),
         contrast_m,
         n_frames: n,
-    })
+    };
+    Some((imprint, of_lens))
 }
 
-fn total(normals: &[Normal]) -> (Matrix4<f64>, Vector4<f64>) {
-    normals.iter().fold((Matrix4::zeros(), Vector4::zeros()), |(information, score), normal| {
+fn total(normals: &[Normal]) -> (Matrix5<f64>, Vector5<f64>) {
+    normals.iter().fold((Matrix5::zeros(), Vector5::zeros()), |(information, score), normal| {
         (information + normal.information, score + normal.score)
     })
 }
@@ -488,7 +556,7 @@ mod tests {
     }
 
     fn place(zoom: f64, shift_px: [f64; 2]) -> Place {
-        Place { center: CENTER, zoom, shift_px }
+        Place { center: CENTER, zoom, shift_px, lens: 0.0 }
     }
 
     /// Normal numbers, always the same ones.
@@ -534,9 +602,9 @@ mod tests {
             })
             .collect();
         let textures: Vec<&Texture> = textures.iter().collect();
-        find(&Print::new(&board), place(1.0, [0.0; 2]), &textures, |frame, place, at| {
-            Some(spot(frame, place.looked_at(at)))
-        })
+        let look = |frame: usize, place: &Place, at| Some(spot(frame, place.looked_at(at)));
+        find(&Print::new(&board), place(1.0, [0.0; 2]), &textures, look, None)
+            .map(|(imprint, _)| imprint)
     }
 
     /// From where it is looked for, six pixels at the board's rim.

@@ -52,4 +52,4 @@ pub use handedness::{CornerDepth, Handedness, handedness};
 pub use imprint::{Imprint, Texture};
 pub use patch::{DepthSteps, Patch, Patches, patches};
 pub use pattern::{Holes, MAX_INCIDENCE_DEG, NEAR_M, Pattern, PatternCell};
-pub use register::{RegisterInput, Registration, Slopes, register};
+pub use register::{OtherState, RegisterInput, Registration, Slopes, register};

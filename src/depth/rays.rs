@@ -6,7 +6,7 @@ use crate::{camera::Camera, geom::Pixel};
 /// radius of 400 px leaves an error of 0.006 px.
 const STEP_PX: f64 = 8.0;
 
-/// The rays (x/z, y/z) of a camera on a grid over its image.
+/// Pairs of numbers on a grid over an image, like the rays (x/z, y/z) of a camera.
 pub(super) struct RayGrid {
     columns: usize,
     rows: usize,
@@ -15,12 +15,17 @@ pub(super) struct RayGrid {
 
 impl RayGrid {
     pub(super) fn new(camera: &Camera) -> Self {
-        let along = |size: usize| (size as f64 / STEP_PX).ceil() as usize + 2;
-        let (columns, rows) = (along(camera.intrinsics.width), along(camera.intrinsics.height));
+        let k = &camera.intrinsics;
+        Self::of([k.width, k.height], |pixel| camera.unproject(pixel))
+    }
+
+    /// What is known of each pixel of an image of this size.
+    pub(super) fn of(size: [usize; 2], known: impl Fn(Pixel) -> Option<[f64; 2]>) -> Self {
+        let [columns, rows] = size.map(|size| (size as f64 / STEP_PX).ceil() as usize + 2);
         // One knot beyond the image on each side: a depth pixel may look there.
         let at = |i: usize| (i as f64 - 1.0) * STEP_PX;
         let knots = (0..columns * rows)
-            .map(|k| camera.unproject(Pixel::new(at(k % columns), at(k / columns))))
+            .map(|k| known(Pixel::new(at(k % columns), at(k / columns))))
             .collect();
         Self { columns, rows, knots }
     }

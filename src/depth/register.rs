@@ -56,6 +56,9 @@ pub struct Registration {
     pub imprint: Option<Imprint>,
     /// How far the two lie apart: χ² over its three degrees of freedom, 1 on average where their σ are right.
     pub disagreement: Option<f64>,
+    /// Whether the depth map is distorted as the colour image is, as a share: 0 where it is, 1 where it is the other
+    /// way, with zoom and shift free. `None` where nothing tells what the other way would be.
+    pub lens_share: Option<Estimate>,
     /// What is left: by frame, over the image, from pixel to pixel.
     pub pattern: Pattern,
 }
@@ -87,7 +90,7 @@ impl Registration {
 }
 
 /// What a registration starts from.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct RegisterInput<'a> {
     /// The board.
     pub board: &'a CharucoBoard,
@@ -98,7 +101,13 @@ pub struct RegisterInput<'a> {
     pub calibration: Option<&'a Calibration>,
     /// Views of the board, each with what the depth map of its frame says.
     pub views: &'a [(&'a View, &'a Patches)],
+    /// Which pixel of the colour image a pixel of the depth map would show if the one were distorted and the other not:
+    /// of a distorted image where the lens puts the pixel, of a rectified one where the tables rectify it to.
+    pub other_state: Option<&'a OtherState<'a>>,
 }
+
+/// See [`RegisterInput::other_state`].
+pub type OtherState<'a> = dyn Fn(Pixel) -> Option<Pixel> + Sync + 'a;
 
 const N: usize = 5;
 type Numbers = SVector<f64, N>;
@@ -141,7 +150,7 @@ const NOISE_GROWTH_PER_M: f64 = 2.2e-3;
 /// camera's own covariance does (poses and rays follow each number of the camera). Not in it: a wrong square length
 /// (the scale is wrong by as much), errors of the board's surface, and what a wrong camera *model* does.
 pub fn register(input: &RegisterInput<'_>) -> Option<Registration> {
-    let RegisterInput { board, camera, calibration, views } = *input;
+    let RegisterInput { board, camera, calibration, views, other_state } = *input;
     let surface = calibration.and_then(|c| c.surface.as_ref());
     let parameters = calibration.map_or(&[][..], |c| &c.parameters);
     let moved = moved_cameras(camera, parameters);
@@ -153,6 +162,10 @@ pub fn register(input: &RegisterInput<'_>) -> Option<Registration> {
         rays: RayGrid::new(camera),
         moved: moved.iter().map(|pair| pair.each_ref().map(RayGrid::new)).collect(),
         center: Pixel::new(camera.intrinsics.cx, camera.intrinsics.cy),
+        lens: other_state.map(|other| {
+            let k = &camera.intrinsics;
+            RayGrid::of([k.width, k.height], |p| other(p).map(|at| [at.x - p.x, at.y - p.y]))
+        }),
     };
     let frames: Vec<(&Stance, &Patches)> = stances
         .iter()
@@ -172,7 +185,7 @@ pub fn register(input: &RegisterInput<'_>) -> Option<Registration> {
         if planes.len() < LEAST_FRAMES {
             return None;
         }
-        let step = between_frames(&planes, &theta)?;
+        let step = between_frames(&planes, &gains(&planes), &theta)?;
         let size = step.delta.component_div(&Numbers::from(PRIOR_SIGMA)).amax();
         theta += step.delta;
         found = Some((planes, step));
@@ -182,9 +195,23 @@ pub fn register(input: &RegisterInput<'_>) -> Option<Registration> {
     }
     let (planes, step) = found?;
     let textures: Vec<&Texture> = frames.iter().map(|(_, patches)| &patches.texture).collect();
-    let look = |frame: usize, place: &Place, at| scene.spot(frames[frame].0, place.looked_at(at));
-    let imprint = imprint::find(&Print::new(board), scene.place(&theta), &textures, look);
-    Some(assemble(input, &scene, &frames, &theta, (&planes, &step, imprint)))
+    let look = |frame: usize, place: &Place, at| {
+        let mut pixel = place.looked_at(at);
+        if place.lens != 0.0 {
+            let ([x, y], _) = scene.lens.as_ref()?.at(pixel)?;
+            pixel = Pixel::new(pixel.x + place.lens * x, pixel.y + place.lens * y);
+        }
+        scene.spot(frames[frame].0, pixel)
+    };
+    let lens = scene.lens.as_ref();
+    let (imprint, lens_imprint) =
+        imprint::find(&Print::new(board), scene.place(&theta), &textures, look, lens).unzip();
+    let lens_share = scene.lens.as_ref().and_then(|_| {
+        let slopes = lens_by_slopes(&planes, &theta, calibration)?;
+        Some(lens_by_both(slopes, lens_imprint.flatten()))
+    });
+    let witnesses = Witnesses { step: &step, imprint, lens_share };
+    Some(assemble(input, &scene, &frames, &theta, (&planes, witnesses)))
 }
 
 struct Scene<'a> {
@@ -193,6 +220,8 @@ struct Scene<'a> {
     rays: RayGrid,
     moved: Vec<[RayGrid; 2]>,
     center: Pixel,
+    /// By how many pixels of the colour image a depth map of the other distortion state would look elsewhere.
+    lens: Option<RayGrid>,
 }
 
 /// A patch before the board.
@@ -205,6 +234,8 @@ struct Sight {
     by_plane: Vector3<f64>,
     /// By the five numbers.
     by_theta: Numbers,
+    /// By the share of the other distortion state.
+    by_lens: f64,
 }
 
 /// What one frame says.
@@ -215,6 +246,8 @@ pub(super) struct Plane {
     beta: Vector3<f64>,
     /// By the five numbers.
     gain: SMatrix<f64, 3, N>,
+    /// By the share of the other distortion state.
+    by_lens: Vector3<f64>,
     /// By one σ of each of the camera's numbers.
     by_camera: Vec<Vector3<f64>>,
     pose: Matrix3<f64>,
@@ -231,7 +264,7 @@ impl Scene<'_> {
     }
 
     fn place(&self, theta: &Numbers) -> Place {
-        Place { center: self.center, zoom: theta[2], shift_px: [theta[3], theta[4]] }
+        Place { center: self.center, zoom: theta[2], shift_px: [theta[3], theta[4]], lens: 0.0 }
     }
 
     /// The board's depth along a ray; `None` beside the board.
@@ -262,6 +295,7 @@ impl Scene<'_> {
         let square = board_m * board_m;
         let m = &stance.plane;
         let slope = [by_x, by_y].map(|by| -square * (m.x * by[0] + m.y * by[1]));
+        let lens = self.lens.as_ref().and_then(|grid| grid.at(p)).map_or([0.0; 2], |(by, _)| by);
         let from_center = [at.x - theta[3] - self.center.x, at.y - theta[4] - self.center.y];
         Some(Sight {
             board_m,
@@ -274,6 +308,7 @@ impl Scene<'_> {
                 -scale * zoom * slope[0],
                 -scale * zoom * slope[1],
             ]),
+            by_lens: scale * (slope[0] * lens[0] + slope[1] * lens[1]),
         })
     }
 
@@ -379,10 +414,12 @@ impl Scene<'_> {
             }
         }
         let mut gain = SMatrix::<f64, 3, N>::zeros();
+        let mut by_lens = Vector3::zeros();
         let mut by_camera = vec![Vector3::zeros(); self.moved.len()];
         for (((patch, s), p), w) in sights.iter().zip(&precision).zip(&robust) {
             let projected = inverse * s.by_plane * (p * w);
             gain.ger(1.0, &projected, &s.by_theta, 1.0);
+            by_lens += projected * s.by_lens;
             for (sum, d) in by_camera.iter_mut().zip(self.by_camera(stance, patch.at, theta)) {
                 *sum += projected * d;
             }
@@ -395,6 +432,7 @@ impl Scene<'_> {
             frame: stance.frame,
             beta,
             gain,
+            by_lens,
             by_camera,
             pose: stance.covariance,
             sensor: inverse * (n as f64 / NOISE_CELLS),
@@ -413,29 +451,49 @@ fn noise_m(board_m: f64) -> f64 {
     NOISE_FLOOR_M.hypot(board_m * board_m * NOISE_GROWTH_PER_M)
 }
 
-/// The second level.
-struct Step {
-    delta: Numbers,
-    covariance: Square,
-    /// What one σ of each of the camera's numbers does to the five.
-    by_camera: Vec<Numbers>,
+/// The second level, for M unknowns: the five, or the share of the other distortion state beside them.
+struct Step<const M: usize> {
+    delta: SVector<f64, M>,
+    covariance: SMatrix<f64, M, M>,
+    /// What one σ of each of the camera's numbers does to them.
+    by_camera: Vec<SVector<f64, M>>,
 }
 
-fn between_frames(planes: &[Plane], theta: &Numbers) -> Option<Step> {
+/// What each of the unknowns does to each frame's plane.
+type Gains<const M: usize> = [SMatrix<f64, 3, M>];
+
+fn gains(planes: &[Plane]) -> Vec<SMatrix<f64, 3, N>> {
+    planes.iter().map(|plane| plane.gain).collect()
+}
+
+/// What keeps an unknown from running away: where it starts, and the σ about that. The share of the other state is
+/// between 0 and 1.
+fn prior<const M: usize>() -> [(f64, f64); M] {
+    let start = [1.0, 0.0, 1.0, 0.0, 0.0, 0.0];
+    let sigma = |k: usize| PRIOR_SIGMA.get(k).copied().unwrap_or(3.0);
+    std::array::from_fn(|k| (start[k], sigma(k)))
+}
+
+fn between_frames<const M: usize>(
+    planes: &[Plane],
+    gains: &Gains<M>,
+    theta: &SVector<f64, M>,
+) -> Option<Step<M>> {
     // How much the sensor adds to what the poses are unsure by: the ratio of greatest restricted likelihood.
     let (ratio, _) = (-16..=16)
         .map(|i| 10f64.powf(f64::from(i) / 4.0))
-        .filter_map(|ratio| Some((ratio, weigh(planes, theta, ratio)?.likelihood)))
+        .filter_map(|ratio| Some((ratio, weigh(planes, gains, theta, ratio)?.likelihood)))
         .fold((1.0, f64::NEG_INFINITY), |best, each| if each.1 > best.1 { each } else { best });
-    let Weighed { delta, information, parts, variance, weights, .. } = weigh(planes, theta, ratio)?;
+    let Weighed { delta, information, parts, variance, weights, .. } =
+        weigh(planes, gains, theta, ratio)?;
     let inverse = Cholesky::new(information)?.inverse();
     let covariance = larger(inverse * variance, leave_one_out(&information, &parts));
     let n_camera = planes.first().map_or(0, |p| p.by_camera.len());
     let by_camera = (0..n_camera)
         .map(|k| {
-            let mut score = Numbers::zeros();
-            for (plane, (precision, w)) in planes.iter().zip(&weights) {
-                score += plane.gain.transpose() * (precision * plane.by_camera[k]) * *w;
+            let mut score = SVector::<f64, M>::zeros();
+            for ((plane, gain), (precision, w)) in planes.iter().zip(gains).zip(&weights) {
+                score += gain.transpose() * (precision * plane.by_camera[k]) * *w;
             }
             -(inverse * score)
         })
@@ -443,17 +501,22 @@ fn between_frames(planes: &[Plane], theta: &Numbers) -> Option<Step> {
     Some(Step { delta, covariance, by_camera })
 }
 
-struct Weighed {
-    delta: Numbers,
-    information: Square,
+struct Weighed<const M: usize> {
+    delta: SVector<f64, M>,
+    information: SMatrix<f64, M, M>,
     /// What each frame alone says: its information, and what it still asks for.
-    parts: Vec<(Square, Numbers)>,
+    parts: Vec<(SMatrix<f64, M, M>, SVector<f64, M>)>,
     variance: f64,
     weights: Vec<(Matrix3<f64>, f64)>,
     likelihood: f64,
 }
 
-fn weigh(planes: &[Plane], theta: &Numbers, ratio: f64) -> Option<Weighed> {
+fn weigh<const M: usize>(
+    planes: &[Plane],
+    gains: &Gains<M>,
+    theta: &SVector<f64, M>,
+    ratio: f64,
+) -> Option<Weighed<M>> {
     let inverses: Vec<(Matrix3<f64>, f64)> = planes
         .iter()
         .map(|plane| {
@@ -462,50 +525,56 @@ fn weigh(planes: &[Plane], theta: &Numbers, ratio: f64) -> Option<Weighed> {
         })
         .collect::<Option<_>>()?;
     let mut weights = vec![1.0; planes.len()];
-    let mut delta = Numbers::zeros();
+    let mut delta = SVector::<f64, M>::zeros();
     let mut variance = 1.0;
-    let mut information = Square::zeros();
-    let start = Numbers::from([1.0, 0.0, 1.0, 0.0, 0.0]);
+    let mut information = SMatrix::<f64, M, M>::zeros();
+    let prior = prior::<M>();
     for _ in 0..15 {
-        information = Square::zeros();
-        let mut score = Numbers::zeros();
-        for ((plane, (inverse, _)), w) in planes.iter().zip(&inverses).zip(&weights) {
-            let weighted = plane.gain.transpose() * inverse * *w;
-            information += weighted * plane.gain;
+        information = SMatrix::zeros();
+        let mut score = SVector::<f64, M>::zeros();
+        for (((plane, gain), (inverse, _)), w) in
+            planes.iter().zip(gains).zip(&inverses).zip(&weights)
+        {
+            let weighted = gain.transpose() * inverse * *w;
+            information += weighted * gain;
             score += weighted * plane.beta;
         }
-        for k in 0..N {
+        for (k, (start, sigma)) in prior.iter().enumerate() {
             // The prior counts as data of variance κ².
-            let precision = variance * PRIOR_SIGMA[k].powi(-2);
+            let precision = variance * sigma.powi(-2);
             information[(k, k)] += precision;
-            score[k] += precision * (start[k] - theta[k]);
+            score[k] += precision * (start - theta[k]);
         }
         delta = Cholesky::new(information)?.solve(&score);
         let squares: Vec<f64> = planes
             .iter()
+            .zip(gains)
             .zip(&inverses)
-            .map(|(plane, (inverse, _))| {
-                let e = plane.beta - plane.gain * delta;
+            .map(|((plane, gain), (inverse, _))| {
+                let e = plane.beta - gain * delta;
                 e.dot(&(inverse * e))
             })
             .collect();
-        let freedom = (3 * planes.len()) as f64 - N as f64;
+        let freedom = (3 * planes.len()) as f64 - M as f64;
         variance = squares.iter().zip(&weights).map(|(s, w)| s * w).sum::<f64>() / freedom.max(1.0);
         for (w, s) in weights.iter_mut().zip(&squares) {
             *w = (FRAME_HUBER / (s / variance).sqrt()).min(1.0);
         }
     }
     let determinants: f64 = inverses.iter().map(|(_, ln)| ln).sum();
-    let scaled = Square::from_fn(|i, j| information[(i, j)] * PRIOR_SIGMA[i] * PRIOR_SIGMA[j]);
-    let freedom = (3 * planes.len()) as f64 - N as f64;
-    let likelihood = -0.5 * (determinants + scaled.determinant().ln() + freedom * variance.ln());
+    let scaled =
+        SMatrix::<f64, M, M>::from_fn(|i, j| information[(i, j)] * prior[i].1 * prior[j].1);
+    let freedom = (3 * planes.len()) as f64 - M as f64;
+    let ln_scaled = Cholesky::new(scaled)?.ln_determinant();
+    let likelihood = -0.5 * (determinants + ln_scaled + freedom * variance.ln());
     let parts = planes
         .iter()
+        .zip(gains)
         .zip(&inverses)
         .zip(&weights)
-        .map(|((plane, (inverse, _)), w)| {
-            let weighted = plane.gain.transpose() * inverse * *w;
-            (weighted * plane.gain, weighted * (plane.beta - plane.gain * delta))
+        .map(|(((plane, gain), (inverse, _)), w)| {
+            let weighted = gain.transpose() * inverse * *w;
+            (weighted * gain, weighted * (plane.beta - gain * delta))
         })
         .collect();
     let weights = inverses.into_iter().map(|(inverse, _)| inverse).zip(weights).collect();
@@ -514,9 +583,12 @@ fn weigh(planes: &[Plane], theta: &Numbers, ratio: f64) -> Option<Weighed> {
 
 /// The covariance by leaving each frame out in turn (jackknife): whatever a frame's residuals have in common counts.
 /// `None` where a frame alone determines a number.
-fn leave_one_out(information: &Square, parts: &[(Square, Numbers)]) -> Option<Square> {
+fn leave_one_out<const M: usize>(
+    information: &SMatrix<f64, M, M>,
+    parts: &[(SMatrix<f64, M, M>, SVector<f64, M>)],
+) -> Option<SMatrix<f64, M, M>> {
     let n = parts.len() as f64;
-    let mut covariance = Square::zeros();
+    let mut covariance = SMatrix::<f64, M, M>::zeros();
     for (part, score) in parts {
         let change = Cholesky::new(information - part)?.solve(score);
         covariance.ger((n - 1.0) / n, &change, &change, 1.0);
@@ -525,10 +597,79 @@ fn leave_one_out(information: &Square, parts: &[(Square, Numbers)]) -> Option<Sq
 }
 
 /// The correlations of the model, for each number the larger of both σ.
-fn larger(model: Square, other: Option<Square>) -> Square {
+fn larger<const M: usize>(
+    model: SMatrix<f64, M, M>,
+    other: Option<SMatrix<f64, M, M>>,
+) -> SMatrix<f64, M, M> {
     let Some(other) = other else { return model };
     let factor = |i: usize| (other[(i, i)] / model[(i, i)]).sqrt().max(1.0);
-    Square::from_fn(|i, j| model[(i, j)] * factor(i) * factor(j))
+    SMatrix::from_fn(|i, j| model[(i, j)] * factor(i) * factor(j))
+}
+
+/// Adds what the camera's own covariance does.
+fn with_camera<const M: usize>(
+    step: &Step<M>,
+    calibration: Option<&Calibration>,
+) -> SMatrix<f64, M, M> {
+    let mut covariance = step.covariance;
+    let Some(calibration) = calibration else { return covariance };
+    let n = calibration.parameters.len();
+    let sigma = |k: usize| calibration.parameters[k].estimate.sigma;
+    for (k, l) in (0..n).flat_map(|k| (0..n).map(move |l| (k, l))) {
+        let correlation = calibration.covariance[k * n + l] / (sigma(k) * sigma(l));
+        if correlation.is_finite() {
+            covariance.ger(correlation, &step.by_camera[k], &step.by_camera[l], 1.0);
+        }
+    }
+    covariance
+}
+
+/// Zoom, shift (px) and the share of the other distortion state, with their covariance.
+pub(super) type LensPlace = (SVector<f64, 4>, SMatrix<f64, 4, 4>);
+
+/// By one step from where the five numbers are best.
+fn lens_by_slopes(
+    planes: &[Plane],
+    theta: &Numbers,
+    calibration: Option<&Calibration>,
+) -> Option<LensPlace> {
+    let gains: Vec<SMatrix<f64, 3, 6>> = planes
+        .iter()
+        .map(|plane| {
+            let mut gain = SMatrix::<f64, 3, 6>::zeros();
+            gain.fixed_columns_mut::<N>(0).copy_from(&plane.gain);
+            gain.set_column(N, &plane.by_lens);
+            gain
+        })
+        .collect();
+    let mut all = SVector::<f64, 6>::zeros();
+    all.fixed_rows_mut::<N>(0).copy_from(theta);
+    let step = between_frames(planes, &gains, &all)?;
+    let covariance = with_camera(&step, calibration);
+    let place = (all + step.delta).fixed_rows::<4>(2).into_owned();
+    Some((place, covariance.fixed_view::<4, 4>(2, 2).into_owned()))
+}
+
+/// The share of the other state by both witnesses, as [`both`] joins them.
+fn lens_by_both((slopes, covariance): LensPlace, imprint: Option<LensPlace>) -> Estimate {
+    let alone = Estimate { value: slopes[3], sigma: covariance[(3, 3)].max(0.0).sqrt() };
+    let Some((print, seen)) = imprint else { return alone };
+    let apart = print - slopes;
+    let Some(inverse) = (seen + covariance).try_inverse() else { return alone };
+    let gain = covariance * inverse;
+    let left = covariance - gain * covariance;
+    let disagreement = apart.dot(&(inverse * apart)) / 4.0;
+    Estimate {
+        value: (slopes + gain * apart)[3],
+        sigma: (left[(3, 3)].max(0.0) * disagreement.max(1.0)).sqrt(),
+    }
+}
+
+/// What zoom and shift are judged by.
+struct Witnesses<'a> {
+    step: &'a Step<N>,
+    imprint: Option<Imprint>,
+    lens_share: Option<Estimate>,
 }
 
 /// Both witnesses of zoom and shift together, weighted by their covariances. Where they lie farther apart than these
@@ -558,22 +699,10 @@ fn assemble(
     scene: &Scene<'_>,
     frames: &[(&Stance, &Patches)],
     theta: &Numbers,
-    (planes, step, imprint): (&[Plane], &Step, Option<Imprint>),
+    (planes, witnesses): (&[Plane], Witnesses<'_>),
 ) -> Registration {
-    let mut covariance = step.covariance;
-    if let Some(calibration) = input.calibration {
-        let n = calibration.parameters.len();
-        let sigma = |k: usize| calibration.parameters[k].estimate.sigma;
-        for (k, l) in (0..n).flat_map(|k| (0..n).map(move |l| (k, l))) {
-            let correlation = calibration.covariance[k * n + l] / (sigma(k) * sigma(l));
-            if !correlation.is_finite() {
-                continue;
-            }
-            for (i, j) in (0..N).flat_map(|i| (0..N).map(move |j| (i, j))) {
-                covariance[(i, j)] += correlation * step.by_camera[k][i] * step.by_camera[l][j];
-            }
-        }
-    }
+    let Witnesses { step, imprint, lens_share } = witnesses;
+    let covariance = with_camera(step, input.calibration);
     let estimate = |theta: &Numbers, covariance: &Square, k: usize| Estimate {
         value: theta[k],
         sigma: covariance[(k, k)].max(0.0).sqrt(),
@@ -632,6 +761,7 @@ fn assemble(
         slopes,
         imprint,
         disagreement,
+        lens_share,
         n_patches,
         pattern: Pattern::new(&input.camera.intrinsics, &residuals, holes),
     }

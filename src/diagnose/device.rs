@@ -1,7 +1,7 @@
 //! Which camera made a recording.
 
 use super::{Registry, Sheet};
-use crate::recording::Factory;
+use crate::{calibrate::Estimate, recording::Factory};
 
 /// The kind of depth sensor. People often do not know which one they have, so every report says it first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -107,12 +107,47 @@ impl DistortionState {
             Self::Unknown => "unknown",
         }
     }
+
+    /// The depth map's state where this is the colour image's, by the share of the other state that depth has
+    /// ([`Registration::lens_share`](crate::depth::Registration::lens_share)): told where the share is on one side of
+    /// one half by 2 sigma, each with 97.7 % confidence.
+    #[must_use]
+    pub fn of_depth(self, lens_share: Option<Estimate>) -> Self {
+        let Some(Estimate { value, sigma }) = lens_share else { return Self::Unknown };
+        let near = |whole: f64| (value - whole).abs() + 2.0 * sigma < 0.5;
+        match self {
+            Self::Rectified | Self::Distorted if near(0.0) => self,
+            Self::Rectified if near(1.0) => Self::Distorted,
+            Self::Distorted if near(1.0) => Self::Rectified,
+            _ => Self::Unknown,
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::camera::Intrinsics;
+
+    #[test]
+    fn depth_is_as_colour_is_or_the_other_way() {
+        use DistortionState::{Distorted, Rectified, RectifiedTwice, Unknown};
+        for (color, value, sigma, expected) in [
+            (Rectified, 0.1, 0.1, Rectified),
+            (Rectified, 0.9, 0.15, Distorted),
+            (Distorted, -0.1, 0.15, Distorted),
+            (Distorted, 1.1, 0.15, Rectified),
+            (Distorted, 0.5, 0.01, Unknown),
+            (Rectified, 0.0, 0.3, Unknown),
+            (Rectified, f64::NAN, 0.1, Unknown),
+            (RectifiedTwice, 0.0, 0.1, Unknown),
+            (Unknown, 0.0, 0.1, Unknown),
+        ] {
+            let share = Estimate { value, sigma };
+            assert_eq!(color.of_depth(Some(share)), expected, "{color:?} {share:?}");
+        }
+        assert_eq!(Rectified.of_depth(None), Unknown);
+    }
 
     #[test]
     fn known_cameras() {

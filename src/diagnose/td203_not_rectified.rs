@@ -105,6 +105,21 @@ pub(super) fn numbers(test: &DistortionTest) -> String {
     }
 }
 
+/// What the depth map's slopes and its print say of its own state, for the end of a summary.
+fn of_depth(state: DistortionState, depth: DistortionState, share: Option<Estimate>) -> String {
+    let Some(Estimate { value, sigma }) = share else { return String::new() };
+    let how = match depth {
+        DistortionState::Unknown => "Whether depth is, too, this recording does not tell",
+        same if same == state => "Depth is, too",
+        _ => "Depth is not as colour is",
+    };
+    format!(
+        " {how}: of the way from colour's state to the other one depth has gone {:.0} % +- {:.0} %.",
+        (100.0 * value).round() + 0.0, // no "-0"
+        100.0 * sigma
+    )
+}
+
 /// Why nothing can be told, for the end of a sentence.
 pub(super) fn why_unknown(case: &Case<'_>) -> String {
     case.poor_fit().unwrap_or_else(|| match case.camera {
@@ -157,17 +172,31 @@ pub(super) fn check(case: &Case<'_>, state: DistortionState) -> Finding {
         }
     };
     finding.verdict = verdict;
-    finding.summary = format!("{words}: {}{remainder}.{claim}", numbers(test));
+    let share = case.registration.and_then(|r| r.lens_share);
+    finding.evidence.extend(share.map(|s| Evidence::estimate("depth_share_of_other_state", s)));
+    let depth = state.of_depth(share);
+    finding.summary =
+        format!("{words}: {}{remainder}.{claim}{}", numbers(test), of_depth(state, depth, share));
+    if depth != DistortionState::Unknown && depth != state {
+        finding.verdict = Verdict::Warning;
+        finding.what_to_do = format!(
+            "Colour is {}, depth is {}: find out what has resampled the one without the other, and record again without \
+             it. No single correction of both makes them agree.",
+            state.name(),
+            depth.name()
+        );
+        return finding;
+    }
     match state {
         DistortionState::Distorted => {
             let tables = case.factory.and_then(|f| f.tables.clone()).map(Box::new);
             finding.what_to_do = if tables.is_some() {
                 "Take corners and pixels through the inverse table before a pinhole is assumed, or resample colour and \
-                 depth with the forward table. Depth is distorted just as colour is: every point off the axis lies \
+                 depth with the forward table. Apple distorts depth just as colour: every point off the axis lies \
                  sideways of where the pinhole puts it."
             } else {
                 "Use the distortion of the own calibration, or record with an app that saves Apple's lookup tables. \
-                 Depth is distorted just as colour is."
+                 Apple distorts depth just as colour."
             }
             .to_owned();
             finding.correction = Some(Correction::Undistort { tables });

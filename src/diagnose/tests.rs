@@ -201,7 +201,13 @@ impl World {
         let views = if self.own.is_some() { &own_views } else { &factory_views };
         let pairs: Vec<_> = views.iter().zip(&patches).collect();
         let registration = self.own.as_ref().and_then(|camera| {
-            register(&RegisterInput { board: &BOARD, camera, calibration: None, views: &pairs })
+            register(&RegisterInput {
+                board: &BOARD,
+                camera,
+                calibration: None,
+                views: &pairs,
+                other_state: None,
+            })
         });
         let frames: Vec<FrameCorners> = observations
             .iter()

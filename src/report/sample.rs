@@ -63,6 +63,7 @@ pub(super) fn audit() -> Audit {
         distortion: calibration.distortion.clone(),
         calibration: Some(calibration),
         distortion_state: DistortionState::Rectified,
+        depth_distortion_state: DistortionState::Rectified,
         findings: findings(),
         frames,
         board,
@@ -133,6 +134,7 @@ pub(super) fn rich_audit() -> Audit {
         },
         imprint: None,
         disagreement: None,
+        lens_share: Some(estimate(0.04, 0.11)),
         pattern,
     });
     audit

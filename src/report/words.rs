@@ -4,7 +4,7 @@ use super::svg::minus;
 use crate::{
     audit::Audit,
     calibrate::{Estimate, Model},
-    diagnose::{Code, Finding, Sensor, Unit, Verdict},
+    diagnose::{Code, DistortionState, Finding, Sensor, Unit, Verdict},
 };
 
 /// One line of the table of quantities.
@@ -97,7 +97,15 @@ fn row(audit: &Audit, finding: &Finding) -> Row {
                 both.map_or_else(dash, pair),
             )
         }
-        Code::TD203 => (dash(), audit.distortion_state.name().replace('_', " ")),
+        Code::TD203 => {
+            let (color, depth) = (audit.distortion_state, audit.depth_distortion_state);
+            let depth = match depth {
+                DistortionState::Unknown => String::new(),
+                same if same == color => ", depth too".to_owned(),
+                other => format!(", depth {}", other.name()),
+            };
+            (dash(), color.name().replace('_', " ") + &depth)
+        }
         // The deviation that was judged (a slope or a mean ratio), so that both columns tell the same.
         Code::TD301 => {
             ("1".to_owned(), judged.map_or_else(dash, |d| value_and_sigma(as_scale(d), 4)))

@@ -1,11 +1,12 @@
 //! Depth against colour on the published recordings, as they are and warped.
 
-use std::{fs, sync::Arc};
+use std::sync::Arc;
 
 use truedepth::{
     audit::{Audit, Method, Options, audit},
     depth::Registration,
-    diagnose::{Code, Verdict},
+    diagnose::{Code, DistortionState, Verdict},
+    geom::Pixel,
     image::DepthMap,
     recording::{Limits, Memory, Recording, encode_depth},
 };
@@ -63,17 +64,29 @@ fn av_foundation_is_aligned() {
     }
 }
 
-/// The depth map that shows the window of this size about the principal point, nearest measurement.
-fn warped(map: &DepthMap, zoom: f64, [cx, cy]: [f64; 2]) -> DepthMap {
-    let (width, height) = (map.width(), map.height());
-    let from = |q: usize, c: f64| (c + zoom * (q as f64 - c)).round();
-    let depth_m = (0..width * height)
-        .map(|i| {
-            let (x, y) = (from(i % width, cx), from(i / width, cy));
-            if x < 0.0 || y < 0.0 { f32::NAN } else { map.at(x as usize, y as usize) }
-        })
-        .collect();
-    DepthMap::new(width, height, depth_m)
+/// The recording with other depth maps: each pixel holds the measurement nearest to where `from` sends it.
+fn moved(recording: &Recording, from: impl Fn(Pixel) -> Option<Pixel>) -> Recording {
+    let mut files = Memory::new("moved");
+    for name in recording.file_names() {
+        files.insert(name, recording.file(name).expect("reads"));
+    }
+    for (index, frame) in recording.frames.iter().enumerate() {
+        let Some(file) = &frame.depth else { continue };
+        let map = recording.depth(index).expect("decodes");
+        let width = map.width();
+        let depth_m = (0..width * map.height())
+            .map(|i| {
+                let at = from(Pixel::new((i % width) as f64, (i / width) as f64));
+                let Some(Pixel { x, y }) = at.filter(|at| at.x > -0.5 && at.y > -0.5) else {
+                    return f32::NAN;
+                };
+                map.at(x.round() as usize, y.round() as usize)
+            })
+            .collect();
+        assert!(files.get(file).is_some(), "{file} is replaced, not added");
+        files.insert(file.clone(), encode_depth(&DepthMap::new(width, map.height(), depth_m)));
+    }
+    Recording::from_source(Arc::new(files), &Limits::default()).expect("opens")
 }
 
 /// The paper's first issue, made from a recording that does not have it.
@@ -83,20 +96,10 @@ fn a_warped_recording_tells_by_how_much() {
         let Some(path) = data(name) else { return };
         let recording = Recording::open(&path, &Limits::default()).expect("opens");
         let factory = recording.factory().expect("metadata").intrinsics;
-        let mut files = Memory::new("warped");
-        for entry in fs::read_dir(&path).expect("lists") {
-            let entry = entry.expect("lists");
-            let name = entry.file_name().into_string().expect("a plain name");
-            files.insert(name, fs::read(entry.path()).expect("reads"));
-        }
-        for (index, frame) in recording.frames.iter().enumerate() {
-            let Some(file) = &frame.depth else { continue };
-            let map = recording.depth(index).expect("decodes");
-            let png = encode_depth(&warped(&map, zoom, [factory.cx, factory.cy]));
-            assert!(files.get(file).is_some(), "{file} is replaced, not added");
-            files.insert(file.clone(), png);
-        }
-        let after = Recording::from_source(Arc::new(files), &Limits::default()).expect("opens");
+        let after = moved(&recording, |q| {
+            let from = |q: f64, c: f64| c + zoom * (q - c);
+            Some(Pixel::new(from(q.x, factory.cx), from(q.y, factory.cy)))
+        });
         let (before, after) = (run(&recording), run(&after));
         let change = registration(&after).zoom.value / registration(&before).zoom.value;
         let percent = 100.0 * (change.max(1.0 / change) - 1.0);
@@ -104,5 +107,27 @@ fn a_warped_recording_tells_by_how_much() {
         assert_eq!(change > 1.0, zoom > 1.0);
         let finding = after.findings.iter().find(|f| f.code == Code::TD401).expect("is checked");
         assert_eq!(finding.verdict, Verdict::Fault, "{finding:?}");
+    }
+}
+
+/// Depth distorted as the lens would, beside colour that is rectified: nobody records that, and who resamples colour
+/// alone makes it.
+#[test]
+fn distorted_depth_beside_rectified_colour_is_told() {
+    let Some(path) = data(RECORDINGS[2]) else { return };
+    let recording = Recording::open(&path, &Limits::default()).expect("opens");
+    let tables = recording.factory().and_then(|f| f.tables.clone()).expect("tables");
+    let before = run(&recording);
+    let after = run(&moved(&recording, |q| tables.undistort(q)));
+    for (audit, whole, state, verdict) in [
+        (&before, 0.0, DistortionState::Rectified, None),
+        (&after, 1.0, DistortionState::Distorted, Some(Verdict::Warning)),
+    ] {
+        let share = registration(audit).lens_share.expect("there are tables");
+        assert!((share.value - whole).abs() < 2.0 * share.sigma && share.sigma < 0.25, "{share:?}");
+        assert_eq!(audit.distortion_state, DistortionState::Rectified);
+        assert_eq!(audit.depth_distortion_state, state, "{share:?}");
+        let finding = audit.findings.iter().find(|f| f.code == Code::TD203).expect("is checked");
+        assert_eq!(finding.verdict == Verdict::Warning, verdict.is_some(), "{finding:?}");
     }
 }

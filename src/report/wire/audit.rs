@@ -41,6 +41,9 @@ pub struct Audit {
     pub alignment: Alignment,
     /// `rectified`, `distorted`, `rectified_twice` or `unknown`.
     pub distortion_state: String,
+    /// The same of the depth maps.
+    #[serde(default)]
+    pub depth_distortion_state: String,
     /// By code.
     pub findings: Vec<FindingInfo>,
     /// In order of time.
@@ -190,6 +193,13 @@ pub struct Alignment {
     pub print: Option<PrintWitness>,
     /// How far these two lie apart: chi-squared over its 3 degrees of freedom; beyond 1 the σ above are larger for it.
     pub disagreement: Option<f64>,
+    /// Whether the depth maps are distorted as the colour images are, as a share: 0 where they are, 1 where one is
+    /// distorted and the other is not; `null` where no tables and no camera tell what that would look like.
+    #[serde(default)]
+    pub lens_share: Option<f64>,
+    /// Standard deviation of `lens_share`.
+    #[serde(default)]
+    pub lens_share_sigma: Option<f64>,
     /// Whether the images show the board mirrored.
     pub mirrored: Option<bool>,
     /// Whether the depth maps are mirrored against the colour images.
@@ -312,6 +322,7 @@ impl From<&audit::Audit> for Audit {
             depth: Depth::new(audit),
             alignment: Alignment::new(audit),
             distortion_state: audit.distortion_state.name().to_owned(),
+            depth_distortion_state: audit.depth_distortion_state.name().to_owned(),
             findings: audit.findings.iter().map(FindingInfo::from).collect(),
             frames: audit.frames.iter().enumerate().map(Frame::from).collect(),
         }
@@ -338,6 +349,8 @@ impl Alignment {
                 contrast_sigma_mm: 1e3 * imprint.contrast_m.sigma,
             }),
             disagreement: found.and_then(|r| r.disagreement),
+            lens_share: found.and_then(|r| finite(r.lens_share?.value)),
+            lens_share_sigma: found.and_then(|r| finite(r.lens_share?.sigma)),
             mirrored: mirrored(&audit.frames),
             depth_mirrored: handedness.map(|h| h.n_mirrored > h.n_straight),
         }
