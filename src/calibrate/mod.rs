@@ -84,6 +84,7 @@ pub use guess::guess_intrinsics;
 pub use job::{MAX_VIEWS, calibrate, calibrate_from, distortion_test};
 pub use model::Model;
 pub use motion::{MeanMotion, ProjectionUncertainty};
+pub(crate) use surface::alike;
 
 use std::fmt;
 

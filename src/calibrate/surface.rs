@@ -17,6 +17,13 @@ const SIGMA_SHARE: f64 = 0.005;
 /// squares is a knot. Paper glued onto card ripples with about twice that from crest to crest.
 const SMOOTH_KNOTS: f64 = 2.0;
 
+/// The correlation of the heights of two places so far apart, beforehand, where knots lie `pitch_m` apart: of Matérn's
+/// form with ν = 3/2.
+pub(crate) fn alike(apart_m: f64, pitch_m: f64) -> f64 {
+    let d = 3.0_f64.sqrt() * apart_m / (SMOOTH_KNOTS * pitch_m);
+    (1.0 + d) * (-d).exp()
+}
+
 /// How far a print may be stretched and sheared: printers are good to a tenth of a percent.
 const PRINT_SIGMA: f64 = 1e-3;
 
@@ -109,11 +116,10 @@ impl Sheet {
             (Some(mixture), knots.collect(), (dx * dy).sqrt())
         };
         let n = knots.len();
-        let scale = 3.0_f64.sqrt() / (SMOOTH_KNOTS * pitch_m);
         let covariance = (0..n * n)
             .map(|at| {
-                let d = scale * (knots[at / n] - knots[at % n]).norm();
-                flat.sigma_m * flat.sigma_m * (1.0 + d) * (-d).exp()
+                let apart_m = (knots[at / n] - knots[at % n]).norm();
+                flat.sigma_m * flat.sigma_m * alike(apart_m, pitch_m)
             })
             .collect();
         let precision = DenseCholesky::new(covariance, n).map(|factor| factor.inverse());

@@ -66,6 +66,8 @@ pub(super) struct Print {
     margin_m: f64,
     columns: usize,
     rows: usize,
+    /// Mean darkness of the board without its margin.
+    pub(super) darkness: f64,
     /// (σ in metres, darkness −½ to ½), by σ.
     levels: Vec<(f64, Vec<f32>)>,
 }
@@ -86,6 +88,12 @@ impl Print {
                 _ => -0.5,
             })
             .collect();
+        let board_only = (0..columns * rows).filter(|i| {
+            let inside = |k: usize, n: usize| (per_square..n - per_square).contains(&k);
+            inside(i % columns, columns) && inside(i / columns, rows)
+        });
+        let n = (board.squares_x * board.squares_y * per_square * per_square) as f64;
+        let darkness = board_only.map(|i| f64::from(raster[i])).sum::<f64>() / n;
         // σ of 1, √2, 2 ... raster cells: each level is the last one blurred by as much as it has already.
         let mut levels = Vec::new();
         let mut have = 0.0_f64;
@@ -96,7 +104,7 @@ impl Print {
             have = want;
             want *= std::f64::consts::SQRT_2;
         }
-        Self { per_m, margin_m: board.square_m, columns, rows, levels }
+        Self { per_m, margin_m: board.square_m, columns, rows, darkness, levels }
     }
 
     /// Darkness and its derivative (per metre) at a place, at the level nearest to this blur; `None` beside the board.

@@ -31,7 +31,8 @@ use crate::{
 pub struct Registration {
     /// 1 for a true sensor.
     pub scale: Estimate,
-    /// Sensor where the board is at 0, metres.
+    /// Sensor where the board is at 0, metres: of something halfway between the print's white and its black, where the
+    /// sensor tells them apart ([`Imprint::contrast_m`]).
     pub bias_m: Estimate,
     /// Width of the window of the colour image that the depth map shows over the width of the image: 1 where they are
     /// aligned, 0.9507 for the ARKit recordings of the paper's iPads.
@@ -204,13 +205,14 @@ pub fn register(input: &RegisterInput<'_>) -> Option<Registration> {
         scene.spot(frames[frame].0, pixel)
     };
     let lens = scene.lens.as_ref();
+    let print = Print::new(board);
     let (imprint, lens_imprint) =
-        imprint::find(&Print::new(board), scene.place(&theta), &textures, look, lens).unzip();
+        imprint::find(&print, scene.place(&theta), &textures, look, lens).unzip();
     let lens_share = scene.lens.as_ref().and_then(|_| {
         let slopes = lens_by_slopes(&planes, &theta, calibration)?;
         Some(lens_by_both(slopes, lens_imprint.flatten()))
     });
-    let witnesses = Witnesses { step: &step, imprint, lens_share };
+    let witnesses = Witnesses { step: &step, imprint, darkness: print.darkness, lens_share };
     Some(assemble(input, &scene, &frames, &theta, (&planes, witnesses)))
 }
 
@@ -669,6 +671,8 @@ fn lens_by_both((slopes, covariance): LensPlace, imprint: Option<LensPlace>) -> 
 struct Witnesses<'a> {
     step: &'a Step<N>,
     imprint: Option<Imprint>,
+    /// Mean darkness of the board, −½ for paper, ½ for ink.
+    darkness: f64,
     lens_share: Option<Estimate>,
 }
 
@@ -701,7 +705,7 @@ fn assemble(
     theta: &Numbers,
     (planes, witnesses): (&[Plane], Witnesses<'_>),
 ) -> Registration {
-    let Witnesses { step, imprint, lens_share } = witnesses;
+    let Witnesses { step, imprint, darkness, lens_share } = witnesses;
     let covariance = with_camera(step, input.calibration);
     let estimate = |theta: &Numbers, covariance: &Square, k: usize| Estimate {
         value: theta[k],
@@ -713,7 +717,10 @@ fn assemble(
     };
     let (theta, covariance, disagreement) = match &imprint {
         Some(imprint) => {
-            let (theta, covariance, apart) = both(theta, &covariance, imprint);
+            let (mut theta, mut covariance, apart) = both(theta, &covariance, imprint);
+            // A board that is darker than grey is measured too far by its share of the contrast.
+            theta[1] -= darkness * imprint.contrast_m.value;
+            covariance[(1, 1)] += (darkness * imprint.contrast_m.sigma).powi(2);
             (theta, covariance, Some(apart))
         }
         None => (*theta, covariance, None),
