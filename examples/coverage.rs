@@ -84,28 +84,12 @@ fn errors(plan: &Plan, audit: &Audit) -> Vec<(&'static str, f64, f64)> {
     }
     if let Some(found) = &audit.registration {
         add("depth scale", found.scale, 1.0 + truth.depth.scale_excess);
-        add("depth bias, m", found.bias_m, truth.depth.bias_m + ink_m(plan));
+        add("depth bias, m", found.bias_m, truth.depth.bias_m);
         add("zoom", found.zoom, truth.depth.zoom);
         add("shift x, px", found.shift_px[0], truth.depth.shift_px[0]);
         add("shift y, px", found.shift_px[1], truth.depth.shift_px[1]);
     }
     errors
-}
-
-/// The sensor measures ink farther than paper, by half of that on either side of what it would say of grey. Of a board
-/// with more ink than paper its mean is farther than its bias says.
-fn ink_m(plan: &Plan) -> f64 {
-    const N: usize = 400;
-    let board = &plan.board;
-    let layout = board.layout.unwrap_or(Layout::Legacy);
-    let at =
-        |i: usize, squares: usize| (i as f64 + 0.5) / N as f64 * squares as f64 * board.square_m;
-    let is_ink = |&(i, j): &(usize, usize)| {
-        board.is_white_at(layout, at(i, board.squares_x), at(j, board.squares_y)) == Some(false)
-    };
-    let places = (0..N).flat_map(|i| (0..N).map(move |j| (i, j)));
-    let share = places.filter(is_ink).count() as f64 / (N * N) as f64;
-    plan.sensor.contrast_m * (share - 0.5)
 }
 
 fn factory_has_tables(plan: &Plan) -> bool {
