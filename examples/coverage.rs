@@ -16,7 +16,6 @@ use std::sync::Arc;
 use rayon::prelude::{IntoParallelIterator, ParallelIterator};
 use truedepth::{
     audit::{Audit, Method, Options, Seen, audit, audit_seen},
-    board::Layout,
     calibrate::{Estimate, Lens},
     diagnose::{Code, Finding, Verdict},
     recording::{Limits, Memory, Recording},
