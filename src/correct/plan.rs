@@ -266,7 +266,10 @@ impl Plan {
         Self::called_for(called, state, which, sampling)
     }
 
-    /// As [`from_findings`](Self::from_findings), for findings that have come some other way. Scale and bias of depth are one line: where one of them is at fault, the other goes with it if it is significant.
+    /// As [`from_findings`](Self::from_findings), for findings that have come some other way.
+    ///
+    /// Scale and bias of depth are one line: where one of them is at fault, the other goes with it if it is
+    /// significant.
     pub fn called_for(
         called: Vec<Called>,
         state: DistortionState,

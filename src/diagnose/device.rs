@@ -114,11 +114,13 @@ impl DistortionState {
     #[must_use]
     pub fn of_depth(self, lens_share: Option<Estimate>) -> Self {
         let Some(Estimate { value, sigma }) = lens_share else { return Self::Unknown };
-        let near = |whole: f64| (value - whole).abs() + 2.0 * sigma < 0.5;
+        let is_same = value.abs() + 2.0 * sigma < 0.5;
+        // As for colour, what lies beyond the whole of the table is distorted all the more.
+        let is_other = value - 2.0 * sigma > 0.5;
         match self {
-            Self::Rectified | Self::Distorted if near(0.0) => self,
-            Self::Rectified if near(1.0) => Self::Distorted,
-            Self::Distorted if near(1.0) => Self::Rectified,
+            Self::Rectified | Self::Distorted if is_same => self,
+            Self::Rectified if is_other => Self::Distorted,
+            Self::Distorted if is_other => Self::Rectified,
             _ => Self::Unknown,
         }
     }
@@ -136,7 +138,8 @@ mod tests {
             (Rectified, 0.1, 0.1, Rectified),
             (Rectified, 0.9, 0.15, Distorted),
             (Distorted, -0.1, 0.15, Distorted),
-            (Distorted, 1.1, 0.15, Rectified),
+            (Distorted, 1.3, 0.3, Rectified),
+            (Distorted, -0.8, 0.1, Unknown),
             (Distorted, 0.5, 0.01, Unknown),
             (Rectified, 0.0, 0.3, Unknown),
             (Rectified, f64::NAN, 0.1, Unknown),

@@ -180,8 +180,8 @@ pub(super) fn check(case: &Case<'_>, state: DistortionState) -> Finding {
     if depth != DistortionState::Unknown && depth != state {
         finding.verdict = Verdict::Warning;
         finding.what_to_do = format!(
-            "Colour is {}, depth is {}: find out what has resampled the one without the other, and record again without \
-             it. No single correction of both makes them agree.",
+            "Colour is {}, depth is {}: find out what has resampled one of them alone, and record again without it. No \
+             single correction of both makes them agree.",
             state.name(),
             depth.name()
         );

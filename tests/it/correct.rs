@@ -105,7 +105,7 @@ fn told_faults_go() {
     assert!(was > 0.005 && is < 0.001, "{was} before, {is} after");
 }
 
-/// A bias within its tolerance is no fault. It is corrected where that is asked for, as a step or as what is significant.
+/// A bias within its tolerance is no fault. Asked for it goes, as a step or as what is significant.
 #[test]
 fn what_is_significant_goes_when_asked() {
     let (simulation, recording) = simulated(&["depth-bias=2mm"]);
