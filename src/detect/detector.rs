@@ -211,6 +211,10 @@ impl Detector {
                     None => self.corner(scales, predicted, axes, contrast),
                 };
                 match measured {
+                    // Refined beyond the last pixels it would be extrapolated, not seen.
+                    Ok((pixel, _)) if !on_pixels(scales.image(), pixel) => {
+                        failed.push(Reject { pixel: predicted, reason: Reason::NoCrossing });
+                    }
                     Ok((pixel, sigma_px)) => corners.push(Corner { id, pixel, sigma_px }),
                     Err(reason) => failed.push(Reject { pixel: predicted, reason }),
                 }
@@ -343,6 +347,12 @@ pub(super) fn factors(image: &Gray) -> Vec<usize> {
     }
     factors.push(1);
     factors
+}
+
+/// Whether a place lies between the centres of the image's pixels.
+fn on_pixels(image: &Gray, at: Pixel) -> bool {
+    let within = |v: f64, size: usize| v >= 0.0 && v <= size as f64 - 1.0;
+    within(at.x, image.width()) && within(at.y, image.height())
 }
 
 /// True where a corner can be measured: three pixels from the border at least.

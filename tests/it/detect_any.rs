@@ -2,7 +2,7 @@
 
 use std::{thread, time::Instant};
 
-use proptest::prelude::*;
+use proptest::{prelude::*, test_runner::RngSeed};
 use truedepth::{
     board::CharucoBoard,
     camera::{Camera, Distortion, Intrinsics},
@@ -102,8 +102,31 @@ fn look(detector: &Detector, image: &Gray) -> Result<Observation, TestCaseError>
     Ok(seen)
 }
 
+/// The same cases every time; `PROPTEST_CASES=10000 cargo test --release --test it detect_any` tries others.
+fn chance() -> ProptestConfig {
+    let usual = ProptestConfig { failure_persistence: None, ..ProptestConfig::default() };
+    match std::env::var_os("PROPTEST_CASES") {
+        Some(_) => usual,
+        None => ProptestConfig { cases: 160, rng_seed: RngSeed::Fixed(2201), ..usual },
+    }
+}
+
+/// Found by chance: a corner that was refined to beyond the last column.
+#[test]
+fn a_corner_lies_on_the_image() {
+    let board: CharucoBoard = BOARD.parse().expect("a board");
+    let patches = [
+        [0.3942561142161987, 0.44412835266501194, 0.2007232595557429, 0.8290437939539744],
+        [0.6907560553259149, 0.4812119425944053, 0.031823948547592795, 0.0],
+    ];
+    let turn_deg = [31.60607988715572, -6.618743121372523, 131.47437751386278];
+    let (_, image) = damaged(&board, [138, 280], turn_deg, 2.1951517597130237, &patches);
+    let seen = look(&Detector::new(&board), &image).expect("holds");
+    assert!(seen.corners.len() > 4, "{:?}", seen.identity);
+}
+
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 160, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(chance())]
 
     #[test]
     fn nothing_is_invented_in_any_texture(
