@@ -430,19 +430,20 @@ impl BlurModel {
             let sum: f32 = (0..n_used).map(|id| patterns[id * length + place]).sum();
             patterns.push(sum / n_used as f32);
         }
-        let normals: Vec<Normal> = (0..=n_used)
-            .map(|id| {
-                let mut square = Box::new([[0.0; SQUARE]; TAPS]);
-                for column in 0..size {
-                    for row in 0..size {
-                        let at = ((id * size + column) * rows + row) * TAP_COLUMNS;
-                        let met = patterns[at..].first_chunk().expect("rows enough");
-                        add_products(&mut square, &kernel(met));
-                    }
+        // A loop, not a closure: that would be compiled for any processor.
+        let mut normals: Vec<Normal> = Vec::with_capacity(n_used + 1);
+        let mut square = Box::new([[0.0; SQUARE]; TAPS]);
+        for id in 0..=n_used {
+            square.as_flattened_mut().fill(0.0);
+            for column in 0..size {
+                for row in 0..size {
+                    let at = ((id * size + column) * rows + row) * TAP_COLUMNS;
+                    let met = patterns[at..].first_chunk().expect("rows enough");
+                    add_products(&mut square, &kernel(met));
                 }
-                triangle(&square)
-            })
-            .collect();
+            }
+            normals.push(triangle(&square));
+        }
         let mut sum = [0.0; TRIANGLE];
         for normal in &normals[..n_used] {
             for (sum, part) in sum.iter_mut().zip(normal) {

@@ -10,8 +10,9 @@ use super::{
     lattice::{Lattice, Node, lattices},
     map::{SmoothMap, length},
     pyramid::Level,
-    refine::{Guess, Scales, Window, refine},
+    refine::{Guess, Scales, refine},
     saddle::{self, saddles},
+    window::Window,
 };
 
 /// Finds a board in images.

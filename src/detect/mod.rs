@@ -37,6 +37,7 @@ mod refine;
 mod saddle;
 mod simd;
 mod trace;
+mod window;
 
 pub use detector::Detector;
 pub use trace::Trace;

@@ -137,6 +137,10 @@ fn block_sums(image: &Gray, factor: usize, y: usize, out: &mut [u16], sums: &mut
                 *out = ((a & 0xff) + (b & 0xff)) + ((a >> 8) + (b >> 8));
             }
         }
+        // Their number of pixels is known when this is compiled.
+        3 => small_blocks::<3>(image, y, out),
+        4 => small_blocks::<4>(image, y, out),
+        8 => small_blocks::<8>(image, y, out),
         _ => {
             sums.fill(0);
             for dy in 0..factor {
@@ -149,6 +153,27 @@ fn block_sums(image: &Gray, factor: usize, y: usize, out: &mut [u16], sums: &mut
                 *out = ((block.iter().sum::<u32>() * unit + n / 2) / n) as u16;
             }
         }
+    }
+}
+
+/// [`block_sums`] of N × N pixels.
+#[inline(always)]
+fn small_blocks<const N: usize>(image: &Gray, y: usize, out: &mut [u16]) {
+    // The sum of all fits into 16 bits.
+    const { assert!(N * N * 255 <= u16::MAX as usize) };
+    let mut rows: [&[[u8; N]]; N] = [&[]; N];
+    for (dy, row) in rows.iter_mut().enumerate() {
+        *row = &image.row(N * y + dy).as_chunks::<N>().0[..out.len()];
+    }
+    let (unit, n) = (unit(N) as u32, (N * N) as u32);
+    for (i, out) in out.iter_mut().enumerate() {
+        let mut sum = 0_u16;
+        for row in rows {
+            for p in row[i] {
+                sum += u16::from(p);
+            }
+        }
+        *out = ((u32::from(sum) * unit + n / 2) / n) as u16;
     }
 }
 

@@ -78,18 +78,17 @@ const REFERENCE_RANK: usize = 24;
 /// Memory of the search, kept for the next image.
 #[derive(Debug, Default)]
 pub(super) struct Memory {
-    /// The latest rows of the response: row y lies at y modulo [`KEPT_ROWS`].
+    /// The latest rows of the response: row y lies at y modulo [`KEPT_ROWS`]. After its pixels a row has zeros, for a
+    /// whole chunk to be looked at wherever one begins.
     response: Vec<i32>,
-    /// For each pixel of a row whether it is a peak.
-    flags: Vec<u8>,
     /// Strength and index of the peaks.
     peaks: Vec<(i32, u32)>,
 }
 
 /// Rows of the response kept: a peak is told from the rows above and below.
 const KEPT_ROWS: usize = 3;
-/// Flags looked at together.
-const FLAGS: usize = 32;
+/// Pixels of a row looked at together.
+const CHUNK: usize = 32;
 
 /// The saddles of a level, strongest first, at most `most`.
 pub(super) fn saddles(level: &Level, most: usize, memory: &mut Memory) -> Vec<Saddle> {
@@ -131,32 +130,35 @@ pub(super) fn saddles(level: &Level, most: usize, memory: &mut Memory) -> Vec<Sa
 fn find_peaks(level: &Level, memory: &mut Memory) {
     let (width, height) = (level.width, level.height);
     let margin = RING_RADIUS as usize;
-    let Memory { response, flags, peaks } = memory;
+    let Memory { response, peaks } = memory;
     peaks.clear();
-    response.resize(KEPT_ROWS * width, 0);
-    flags.clear();
-    flags.resize(width.next_multiple_of(FLAGS), 0);
+    let stride = width + CHUNK;
+    response.clear();
+    response.resize(KEPT_ROWS * stride, 0);
     for y in 1..height - 1 {
-        response_row(level, y, &mut response[y % KEPT_ROWS * width..][..width]);
+        response_row(level, y, &mut response[y % KEPT_ROWS * stride..][..width]);
         let middle = y - 1;
         if middle < margin || middle + margin >= height {
             continue;
         }
-        let [above, here, below] =
-            [middle - 1, middle, y].map(|y| &response[y % KEPT_ROWS * width..][..width]);
-        flag_peaks([above, here, below], &mut flags[margin..width - margin]);
-        for (chunk, flags) in flags.as_chunks::<FLAGS>().0.iter().enumerate() {
-            let words: [u64; FLAGS / 8] =
-                array::from_fn(|k| u64::from_le_bytes(array::from_fn(|i| flags[8 * k + i])));
-            if words.iter().fold(0, |any, word| any | word) == 0 {
+        let rows = [middle - 1, middle, y].map(|y| &response[y % KEPT_ROWS * stride..][..stride]);
+        for first in (margin..width - margin).step_by(CHUNK) {
+            let here: &[i32; CHUNK] = rows[1][first..].first_chunk().expect("zeros follow");
+            // Most of most images is smooth.
+            if !here.iter().fold(false, |any, &s| any | (s > MIN_STRENGTH)) {
                 continue;
             }
+            let flags = flag_peaks(rows, first);
+            let words: [u64; CHUNK / 8] =
+                array::from_fn(|k| u64::from_le_bytes(array::from_fn(|i| flags[8 * k + i])));
             for (k, mut word) in words.into_iter().enumerate() {
                 while word != 0 {
                     // A flag is 1 in a byte of its own.
-                    let x = chunk * FLAGS + 8 * k + word.trailing_zeros() as usize / 8;
+                    let x = 8 * k + word.trailing_zeros() as usize / 8;
                     word &= word - 1;
-                    peaks.push((here[x], (middle * width + x) as u32));
+                    if first + x < width - margin {
+                        peaks.push((here[x], (middle * width + first + x) as u32));
+                    }
                 }
             }
         }
@@ -183,20 +185,22 @@ fn response_row(level: &Level, y: usize, out: &mut [i32]) {
     }
 }
 
-/// Flags the pixels that exceed [`MIN_STRENGTH`] and their eight neighbours. The flags are those of the middle of the
-/// rows: as many as they have pixels but for [`RING_RADIUS`] at each end.
+/// Which pixels of a chunk of the middle row exceed [`MIN_STRENGTH`] and their eight neighbours.
 #[inline(always)]
-fn flag_peaks(rows: [&[i32]; 3], flags: &mut [u8]) {
-    let (n, first) = (flags.len(), RING_RADIUS as usize - 1);
-    let [[a0, a1, a2], [b0, b1, b2], [c0, c1, c2]] =
-        rows.map(|row| [0, 1, 2].map(|dx| &row[first + dx..][..n]));
-    for i in 0..n {
+fn flag_peaks(rows: [&[i32]; 3], first: usize) -> [u8; CHUNK] {
+    let [[a0, a1, a2], [b0, b1, b2], [c0, c1, c2]] = rows.map(|row| {
+        let three: &[i32; CHUNK + 2] = row[first - 1..].first_chunk().expect("zeros follow");
+        [0, 1, 2].map(|dx| three[dx..].first_chunk::<CHUNK>().expect("two more than the chunk"))
+    });
+    let mut flags = [0; CHUNK];
+    for i in 0..CHUNK {
         let s = b1[i];
         // A strict order among equals, so that a plateau yields one peak.
         let before = a0[i].max(a1[i]).max(a2[i]).max(b0[i]).max(MIN_STRENGTH);
         let after = c0[i].max(c1[i]).max(c2[i]).max(b2[i]);
         flags[i] = u8::from(s > before && s >= after);
     }
+    flags
 }
 
 /// The saddle at a peak of the response; `None` where its surroundings are not those of a chessboard's corner.

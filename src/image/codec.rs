@@ -2,6 +2,8 @@
 
 use std::io::{Cursor, ErrorKind};
 
+use crate::solve::vectorized;
+
 use super::{DepthMap, Gray, Rgb, jpeg, rgb::luma, unfiltered};
 
 /// What an untrusted image may ask for.
@@ -122,10 +124,24 @@ impl Gray {
                     out.extend(row.as_chunks::<2>().0.iter().map(|&[gray, _]| gray));
                 },
                 3 => |row: &[u8], out: &mut Vec<u8>| {
-                    out.extend(row.as_chunks::<3>().0.iter().map(|&rgb| luma(rgb)));
+                    add_luma(
+                        row.as_chunks().0,
+                        out,
+                        #[inline(always)]
+                        |rgb| rgb,
+                    );
                 },
                 _ => |row: &[u8], out: &mut Vec<u8>| {
-                    out.extend(row.as_chunks::<4>().0.iter().map(|&[r, g, b, _]| luma([r, g, b])));
+                    // Whole words, which vectors are made of more easily than of three bytes in four.
+                    add_luma(
+                        row.as_chunks().0,
+                        out,
+                        #[inline(always)]
+                        |rgba| {
+                            let word = u32::from_le_bytes(rgba);
+                            [word as u8, (word >> 8) as u8, (word >> 16) as u8]
+                        },
+                    );
                 },
             })?;
         Ok(Self::new(width, height, pixels))
@@ -157,6 +173,24 @@ impl Gray {
             },
         )
     }
+}
+
+/// Adds the luma of pixels of N channels.
+fn add_luma<const N: usize>(
+    pixels: &[[u8; N]],
+    out: &mut Vec<u8>,
+    color: impl Fn([u8; N]) -> [u8; 3],
+) {
+    let start = out.len();
+    out.resize(start + pixels.len(), 0);
+    vectorized(
+        #[inline(always)]
+        || {
+            for (out, &pixel) in out[start..].iter_mut().zip(pixels) {
+                *out = luma(color(pixel));
+            }
+        },
+    );
 }
 
 impl Rgb {

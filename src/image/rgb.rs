@@ -44,6 +44,7 @@ impl Rgb {
 }
 
 /// 0.299 R + 0.587 G + 0.114 B in 14-bit fixed point, OpenCV's own coefficients.
+#[inline(always)]
 pub(super) fn luma([r, g, b]: [u8; 3]) -> u8 {
     ((u32::from(r) * 4899 + u32::from(g) * 9617 + u32::from(b) * 1868 + (1 << 13)) >> 14) as u8
 }

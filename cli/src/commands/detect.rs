@@ -10,7 +10,7 @@ use truedepth::{
     board::CharucoBoard,
     detect::Detector,
     image::{Gray, Rgb},
-    recording::Recording,
+    recording::{Found, Recording},
     report::{
         self, Overlay,
         wire::{self, DetectedImage},
@@ -30,30 +30,32 @@ pub(crate) fn run(args: &DetectArgs, terminal: &Terminal) -> Result<Outcome, Fai
     let board = input::board(&args.input.board)?;
     let overwrite = if args.force { Overwrite::Yes } else { Overwrite::No };
     let folder = args.overlay.as_deref().map(|path| OverlayFolder::new(path, overwrite));
-    let mut search =
-        Search { board: board.as_ref(), args, terminal, overlays: folder.transpose()? };
-    let mut images = Vec::new();
-    let mut outcome = Outcome::Clean;
+    let mut search = Search {
+        board: board.as_ref(),
+        args,
+        terminal,
+        overlays: folder.transpose()?,
+        detector: None,
+        images: Vec::new(),
+        outcome: Outcome::Clean,
+    };
+    // Images named one by one are searched together: all cores have work, and the order stays as it was given.
+    let mut alone = Vec::new();
     for path in &args.paths {
-        match search.path(path) {
-            Ok(found) => {
-                for image in found {
-                    match image {
-                        Ok(image) => images.push(image),
-                        Err(failure) => {
-                            terminal.failure(&failure);
-                            outcome = Outcome::NotAllRan;
-                        }
-                    }
-                }
+        match Input::at(path, &args.input) {
+            Ok(Input::Images(files)) => alone.extend(files),
+            Ok(Input::Recordings(found)) => {
+                let before = search.images(std::mem::take(&mut alone));
+                search.or_go_on(before)?;
+                let done = search.recordings(found);
+                search.or_go_on(done)?;
             }
-            Err(failure) if args.paths.len() == 1 => return Err(failure),
-            Err(failure) => {
-                terminal.failure(&failure);
-                outcome = Outcome::NotAllRan;
-            }
+            Err(failure) => search.or_go_on(Err(failure))?,
         }
     }
+    let done = search.images(alone);
+    search.or_go_on(done)?;
+    let Search { images, outcome, .. } = search;
     if let (Some(folder), false) = (&args.overlay, images.is_empty()) {
         terminal.say(&format!("overlays: {}", folder.display()));
     }
@@ -66,46 +68,39 @@ pub(crate) fn run(args: &DetectArgs, terminal: &Terminal) -> Result<Outcome, Fai
     Ok(outcome)
 }
 
-type Searched = Vec<Result<DetectedImage, Failure>>;
-
-/// What is the same for all paths.
+/// What is the same for all paths, and what has come of them.
 struct Search<'a> {
     board: Option<&'a CharucoBoard>,
     args: &'a DetectArgs,
     terminal: &'a Terminal,
     overlays: Option<OverlayFolder>,
+    /// That of the latest board: what it has prepared, and its memory, serve all images of that board.
+    detector: Option<Detector>,
+    images: Vec<DetectedImage>,
+    outcome: Outcome,
 }
 
 impl Search<'_> {
-    /// All images at a path, searched, in order.
-    fn path(&mut self, path: &Path) -> Result<Searched, Failure> {
-        let unknown = |what: &str| {
-            Failure::new(format!("{what}: the board is not known"))
-                .hint("say which with --board, like --board 10x8:20.875mm:10.4375mm:ARUCO_ORIGINAL")
-        };
-        match Input::at(path, &self.args.input)? {
-            Input::Recordings(found) => {
-                let mut all = Vec::new();
-                for found in found {
-                    let recording = found.open()?;
-                    let board = self
-                        .board
-                        .or(recording.board.as_ref())
-                        .ok_or_else(|| unknown(recording.place()))?;
-                    all.extend(self.recording(&recording, board));
-                }
-                Ok(all)
-            }
-            Input::Images(files) => {
-                let shown = path.display().to_string();
-                let board = self.board.ok_or_else(|| unknown(&shown))?;
-                Ok(self.images(&shown, files, board))
-            }
+    fn failed(&mut self, failure: &Failure) {
+        self.terminal.failure(failure);
+        self.outcome = Outcome::NotAllRan;
+    }
+
+    /// Where it is one path of several that cannot be searched, says so; the rest goes on.
+    fn or_go_on(&mut self, done: Result<(), Failure>) -> Result<(), Failure> {
+        match done {
+            Err(failure) if self.args.paths.len() > 1 => self.failed(&failure),
+            other => return other,
         }
+        Ok(())
     }
 
     /// Images of their own.
-    fn images(&mut self, shown: &str, files: Vec<PathBuf>, board: &CharucoBoard) -> Searched {
+    fn images(&mut self, files: Vec<PathBuf>) -> Result<(), Failure> {
+        let Some(first) = files.first() else { return Ok(()) };
+        let first = first.display().to_string();
+        let board = self.board.ok_or_else(|| unknown_board(&first))?;
+        let what = if files.len() == 1 { first } else { "images".to_owned() };
         let limits = input::limits(&self.args.input).image;
         let images = files
             .into_iter()
@@ -119,7 +114,7 @@ impl Search<'_> {
             image.map_err(|e| Failure::from(e).within(format!("cannot read {}", file.display())))
         };
         self.all(
-            shown,
+            &what,
             images,
             board,
             &Decode {
@@ -129,11 +124,24 @@ impl Search<'_> {
                     Rgb::decode(&bytes, &limits).map_err(Failure::from)
                 },
             },
-        )
+        );
+        Ok(())
     }
 
-    /// The colour images of a recording, in order of time.
-    fn recording(&mut self, recording: &Recording, board: &CharucoBoard) -> Searched {
+    /// The colour images of recordings, each in order of time.
+    fn recordings(&mut self, found: Vec<Found>) -> Result<(), Failure> {
+        for found in found {
+            let recording = found.open()?;
+            let board = self
+                .board
+                .or(recording.board.as_ref())
+                .ok_or_else(|| unknown_board(recording.place()))?;
+            self.recording(&recording, board);
+        }
+        Ok(())
+    }
+
+    fn recording(&mut self, recording: &Recording, board: &CharucoBoard) {
         let frames = recording.frames.iter().enumerate();
         let images = frames
             .filter_map(|(index, frame)| {
@@ -155,24 +163,27 @@ impl Search<'_> {
                 gray: |&index: &usize| Ok(recording.gray(index)?),
                 rgb: |&index: &usize| Ok(recording.rgb(index)?),
             },
-        )
+        );
     }
 
+    /// Searches all, side by side; what is found is kept in their order.
     fn all<S, G, R>(
-        &self,
+        &mut self,
         what: &str,
         images: Vec<Image<S>>,
         board: &CharucoBoard,
         decode: &Decode<G, R>,
-    ) -> Searched
-    where
+    ) where
         S: Sync,
         G: Fn(&S) -> Result<Gray, Failure> + Sync,
         R: Fn(&S) -> Result<Rgb, Failure> + Sync,
     {
-        let detector = Detector::new(board);
+        let detector = match self.detector.take() {
+            Some(detector) if detector.board() == board => detector,
+            _ => Detector::new(board),
+        };
         let bar = self.terminal.progress(what, images.len());
-        let found = images
+        let found: Vec<Result<DetectedImage, Failure>> = images
             .par_iter()
             .map(|image| {
                 let found = self.one(image, &detector, decode);
@@ -181,7 +192,13 @@ impl Search<'_> {
             })
             .collect();
         bar.finish_and_clear();
-        found
+        self.detector = Some(detector);
+        for image in found {
+            match image {
+                Ok(image) => self.images.push(image),
+                Err(failure) => self.failed(&failure),
+            }
+        }
     }
 
     /// Decodes and searches one image, looks at the clock, and draws.
@@ -212,6 +229,11 @@ impl Search<'_> {
         }
         Ok(found)
     }
+}
+
+fn unknown_board(what: &str) -> Failure {
+    Failure::new(format!("{what}: the board is not known"))
+        .hint("say which with --board, like --board 10x8:20.875mm:10.4375mm:ARUCO_ORIGINAL")
 }
 
 /// One image to search.
