@@ -106,9 +106,9 @@ const MOST_STEPS: usize = 8;
 /// The slope of the sums is taken anew where the corner has moved by more than this since, pixels.
 const SAME_SLOPE: f64 = 0.3;
 /// What pixels that undersample a sharp edge leave even in a noiseless picture, pixels.
-const FLOOR_PX: f64 = 0.015;
+const FLOOR_PX: f64 = 0.0175;
 /// Width of the edges that are undersampled by so much, pixels: with wider edges it falls in proportion.
-const UNDERSAMPLED: f64 = 2.0;
+const UNDERSAMPLED: f64 = 1.5;
 
 /// Largest factor by which a blurred picture is reduced.
 const MAX_FACTOR: usize = 6;
@@ -117,9 +117,11 @@ const MAX_FACTOR: usize = 6;
 const KEPT_BLUR: f64 = 5.0;
 /// Uncertainty of where in a blur the corner is, as a fraction of the width beyond a sharp edge's.
 const BLUR_SIGMA: f64 = 0.03;
-/// Where a white rim is too narrow for its blur, the marker's own edge pulls the corner: this much for every pixel that
-/// is wanting, from simulated boards with rims of 0.1 to 0.15 squares.
-const MARKER_SIGMA: f64 = 0.15;
+/// Where a white rim is too narrow for its blur, the marker's own edge and bits pull the corner: this much for the
+/// square of the pixels that are wanting, from simulated boards with rims of 0.075 to 0.25 squares.
+const MARKER_SIGMA: f64 = 0.07;
+/// How gently that sets in, pixels: blur has no end.
+const MARKER_ONSET: f64 = 0.5;
 /// Width of an edge that counts as sharp, pixels.
 const SHARP: f64 = 5.0;
 
@@ -149,7 +151,8 @@ pub(super) fn refine(scales: &mut Scales<'_>, guess: &Guess, reach_px: f64) -> O
     let floor = FLOOR_PX * (UNDERSAMPLED / blur[0].min(blur[1])).min(1.0);
     let blur_sigma = BLUR_SIGMA * (widest - SHARP).max(0.0);
     let rim_px = guess.rim * across[0].min(across[1]);
-    let marker_sigma = MARKER_SIGMA * (widest / 2.0 + MIN_WIDTH - rim_px).max(0.0);
+    let wanting = widest / 2.0 + MIN_WIDTH - rim_px;
+    let marker_sigma = MARKER_SIGMA * ((wanting + wanting.hypot(MARKER_ONSET)) / 2.0).powi(2);
     Some(Refined {
         pixel: Pixel::new(found.pixel.x * f + offset, found.pixel.y * f + offset),
         sigma_px: (found.sigma_px * noise * f).hypot(floor).hypot(blur_sigma).hypot(marker_sigma),

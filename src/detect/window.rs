@@ -10,30 +10,51 @@ use crate::{image::Gray, solve};
 
 /// Least determinant of the slope, as a fraction of that without the motion of the weights: below, noise rules.
 const MIN_SLOPE: f64 = 0.1;
+/// What is left of the slope at least, of its determinant: below, nobody can tell how much.
+const LEAST_SLOPE: f64 = 0.03;
+
 /// How fast the sums Σ w g gᵀ(p − q) fall as q moves: a matrix K, so that q + K⁻¹·sums is where they vanish.
 ///
 /// K = M + N: M = Σ w g gᵀ would be all if the weights stood still. They move with q, and on a blurred edge what comes
 /// in on one side pulls, what goes out on the other pulls less: N = Σ g (gᵀr)·(∇w)ᵀ takes a tenth off M at a blur of
 /// σ = 2 px, and hence adds a tenth to σ.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Slope([[f64; 2]; 2]);
+pub(super) struct Slope {
+    k: [[f64; 2]; 2],
+    /// By how much σ is larger than this slope says. Where blur has taken most of it (a wide blur within a narrow rim),
+    /// M takes its place, which leads to the same corner; noise moves that as much farther as the slope is less.
+    widens: f64,
+}
 
 impl Slope {
+    /// From M and N.
+    fn new(m: [[f64; 2]; 2], n: [[f64; 2]; 2]) -> Self {
+        let det = |[[a, b], [c, d]]: [[f64; 2]; 2]| a * d - b * c;
+        let k = [0, 1].map(|i| [0, 1].map(|j| m[i][j] + n[i][j]));
+        let left = if k[0][0] + k[1][1] > 0.0 { det(k) / det(m) } else { 0.0 };
+        if left > MIN_SLOPE {
+            Self { k, widens: 1.0 }
+        } else {
+            // As though both directions had lost as much.
+            Self { k: m, widens: left.max(LEAST_SLOPE).sqrt().recip() }
+        }
+    }
+
     fn det(&self) -> f64 {
-        let [[a, b], [c, d]] = self.0;
+        let [[a, b], [c, d]] = self.k;
         a * d - b * c
     }
 
     /// K⁻¹ v.
     pub(super) fn divide(&self, v: [f64; 2]) -> [f64; 2] {
-        let [[a, b], [c, d]] = self.0;
+        let [[a, b], [c, d]] = self.k;
         let det = self.det();
         [(d * v[0] - b * v[1]) / det, (a * v[1] - c * v[0]) / det]
     }
 
     /// Trace of K⁻¹ V K⁻ᵀ for a symmetric V = [xx xy; xy yy].
     fn covariance_trace(&self, [xx, xy, yy]: [f64; 3]) -> f64 {
-        let [[a, b], [c, d]] = self.0;
+        let [[a, b], [c, d]] = self.k;
         let (x, y) = (d * d + c * c, a * a + b * b);
         let det = self.det();
         (x * xx - 2.0 * (b * d + a * c) * xy + y * yy) / det / det
@@ -321,13 +342,11 @@ impl Window {
         }
         // The slope of the weight in pixels: its slope per square times the inverse of the axes.
         let [u, v] = cross.inverse.map(|row| row.map(f64::from));
-        let moving = Slope([
-            [a + xa * u[0] + xb * v[0], b + xa * u[1] + xb * v[1]],
-            [b + ya * u[0] + yb * v[0], c + ya * u[1] + yb * v[1]],
-        ]);
-        let falls = moving.0[0][0] + moving.0[1][1] > 0.0 && moving.det() > MIN_SLOPE * det;
-        let slope = if falls { moving } else { Slope([[a, b], [b, c]]) };
-        Some((slope, [rx, ry]))
+        let moving = [
+            [xa * u[0] + xb * v[0], xa * u[1] + xb * v[1]],
+            [ya * u[0] + yb * v[0], ya * u[1] + yb * v[1]],
+        ];
+        Some((Slope::new([[a, b], [b, c]], moving), [rx, ry]))
     }
 
     /// The sums Σ w g gᵀ(p − q) alone.
@@ -362,7 +381,7 @@ impl Window {
         q: [f64; 2],
     ) -> f64 {
         let covariance = self.raw_covariance(simd, cross, q);
-        (0.5 * slope.covariance_trace(covariance)).sqrt() / 32.0
+        slope.widens * (0.5 * slope.covariance_trace(covariance)).sqrt() / 32.0
     }
 
     /// Σ over the raw pixels of the products of their influences on both sums, times 32².

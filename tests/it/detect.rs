@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, fs};
 
 use truedepth::{
     board::{CharucoBoard, Layout},
-    camera::{Camera, Distortion, Intrinsics},
+    camera::{Brown, Camera, Distortion, Intrinsics},
     detect::{Detector, Observation, Reason},
     geom::{Board, Color, Pixel, Pose, Rotation, Vector3},
     image::{Gray, Limits},
@@ -103,6 +103,36 @@ fn corners_are_accurate_unbiased_and_know_their_sigma() {
     }
 }
 
+/// Where the rim round a marker is narrow, blur brings its edge and bits to the corner: σ says so.
+#[test]
+fn sigma_is_honest_beside_wide_markers() {
+    for marker in [0.6, 0.7, 0.75, 0.8] {
+        let board = board(&format!("10x8:20mm:{}mm:4X4_50", 20.0 * marker));
+        let detector = Detector::new(&board);
+        for (blur_sigma_px, noise) in [(0.6, 1.0), (1.2, 1.0), (1.2, 3.0), (2.0, 3.0)] {
+            let mut squares = Vec::new();
+            for (index, color_from_board) in views(&board).into_iter().enumerate() {
+                let mut scene =
+                    Scene::ideal(board.clone(), camera(590.0, 640, 480), color_from_board);
+                scene.blur_sigma_px = blur_sigma_px;
+                scene.noise = Noise::Gray { sigma: noise };
+                let rendered = render(&scene, index as u64);
+                let seen = errors(&rendered, &detector.detect(&rendered.gray()));
+                squares.extend(seen.iter().map(|([x, y], s)| (x * x + y * y) / (2.0 * s * s)));
+            }
+            let n = squares.len();
+            let variance = squares.iter().sum::<f64>() / n as f64;
+            println!(
+                "markers {marker}, blur {blur_sigma_px}, noise {noise}: {n} corners, {variance:.2}"
+            );
+            assert!(
+                (0.8..1.2).contains(&variance),
+                "{marker}, {blur_sigma_px}, {noise}: {variance}"
+            );
+        }
+    }
+}
+
 #[test]
 fn layouts_are_told_apart() {
     for layout in [Layout::Legacy, Layout::New] {
@@ -195,8 +225,13 @@ fn a_view_that_fits_both_layouts_asks_for_the_word_of_the_printer() {
 #[test]
 fn motion_does_not_hide_the_board() {
     let board = board(PAPER);
+    let detector = Detector::new(&board);
     for (index, color_from_board) in views(&board).into_iter().enumerate() {
-        for motion_px in [4.0, 7.0] {
+        for (motion_px, handedness) in [
+            (4.0, Handedness::AsDesigned),
+            (7.0, Handedness::AsDesigned),
+            (7.0, Handedness::Mirrored),
+        ] {
             let mut scene = Scene::ideal(board.clone(), camera(590.0, 640, 480), color_from_board);
             let distance_m = 0.35;
             let angle = 0.7 * index as f64;
@@ -207,14 +242,59 @@ fn motion_does_not_hide_the_board() {
             };
             scene.blur_sigma_px = 0.8;
             scene.noise = Noise::Gray { sigma: 2.0 };
+            scene.print.handedness = handedness;
             let rendered = render(&scene, index as u64);
-            let seen = Detector::new(&board).detect(&rendered.gray());
+            let seen = detector.detect(&rendered.gray());
             let found = errors(&rendered, &seen).len();
             let n_true = rendered.corners.len();
             assert!(
                 found as f64 >= 0.9 * n_true as f64,
-                "view {index}, {motion_px} px: {found} of {n_true}"
+                "view {index}, {motion_px} px, {handedness:?}: {found} of {n_true}"
             );
+            let mirrored = seen.identity.expect("corners have an identity").mirrored;
+            assert_eq!(mirrored, handedness == Handedness::Mirrored, "view {index}");
+        }
+    }
+}
+
+/// The image's left and right border are seen at 45° and more, through a lens that moves what is there inwards by a
+/// quarter of its distance from the middle, or outwards by a fourteenth.
+#[test]
+fn wide_angle_lenses_are_tolerated() {
+    let board = board(PAPER);
+    let detector = Detector::new(&board);
+    for (k1, k2) in [(-0.16, 0.015), (0.08, 0.0)] {
+        let camera = Camera {
+            distortion: Distortion::Brown(Brown { k1, k2, p1: 0.0, p2: 0.0, k3: 0.0 }),
+            ..camera(320.0, 640, 480)
+        };
+        // In the middle, where the board fills the image, and at two of its borders.
+        for (index, (distance_m, turn, [x, y])) in [
+            (0.16, [8.0, -6.0, 12.0], [0.0, 0.0]),
+            (0.17, [-14.0, 18.0, 95.0], [0.08, 0.02]),
+            (0.18, [20.0, -15.0, 190.0], [-0.07, -0.05]),
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            let mut color_from_board = pose(&board, distance_m, turn);
+            color_from_board.translation += Vector3::new(x, y, 0.0);
+            let mut scene = Scene::ideal(board.clone(), camera.clone(), color_from_board);
+            scene.blur_sigma_px = 0.7;
+            scene.noise = Noise::Gray { sigma: 2.0 };
+            let rendered = render(&scene, index as u64);
+            let seen = detector.detect(&rendered.gray());
+            let found = errors(&rendered, &seen);
+            let n_true = rendered
+                .corners
+                .iter()
+                .filter(|c| (8.0..631.0).contains(&c.pixel.x) && (8.0..471.0).contains(&c.pixel.y))
+                .count();
+            let rms = found.iter().map(|([x, y], _)| x * x + y * y).sum::<f64>();
+            let rms = (rms / found.len() as f64).sqrt();
+            println!("k1 {k1}, view {index}: {} of {n_true} corners, rms {rms:.3} px", found.len());
+            assert!(found.len() as f64 >= 0.98 * n_true as f64, "{} of {n_true}", found.len());
+            assert!(rms < 0.06, "{rms} px");
         }
     }
 }

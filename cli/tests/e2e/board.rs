@@ -11,7 +11,7 @@ const MINE: &str = "%YAML:1.0\nnmarkers: 4\nmarkersize: 3\nmarker_0: \"110000001
 fn what_is_printed_can_be_detected() {
     let scratch = Scratch::new();
     let run = |line: &str| truedepth_in(scratch.path(), line.split(' '));
-    run("board -o out/board.png --dpi 100").code(0).says(&["100 %", "10x7:24mm:18mm:5X5_100:new"]);
+    run("board -o out/board.png --dpi 100").code(0).says(&["100 %", "10x7:24mm:15mm:5X5_100:new"]);
     let toml = fs::read_to_string(scratch.join("out/board.toml")).expect("it was written");
     assert_eq!(
         toml,
