@@ -2,9 +2,7 @@
 
 use std::io::{Cursor, ErrorKind};
 
-use crate::solve::vectorized;
-
-use super::{DepthMap, Gray, Rgb, jpeg, rgb::luma, unfiltered};
+use super::{DepthMap, Gray, Rgb, extend, jpeg, rgb::luma, unfiltered};
 
 /// What an untrusted image may ask for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -121,25 +119,25 @@ impl Gray {
             decode_eight_bits(bytes, limits, |channels| match channels {
                 1 => |row: &[u8], out: &mut Vec<u8>| out.extend_from_slice(row),
                 2 => |row: &[u8], out: &mut Vec<u8>| {
-                    out.extend(row.as_chunks::<2>().0.iter().map(|&[gray, _]| gray));
-                },
-                3 => |row: &[u8], out: &mut Vec<u8>| {
-                    add_luma(
-                        row.as_chunks().0,
+                    extend(
                         out,
+                        row.as_chunks::<2>().0,
                         #[inline(always)]
-                        |rgb| rgb,
+                        |[gray, _]| gray,
                     );
                 },
+                3 => |row: &[u8], out: &mut Vec<u8>| {
+                    extend(out, row.as_chunks::<3>().0, luma);
+                },
                 _ => |row: &[u8], out: &mut Vec<u8>| {
-                    // Whole words, which vectors are made of more easily than of three bytes in four.
-                    add_luma(
-                        row.as_chunks().0,
+                    extend(
                         out,
+                        row.as_chunks().0,
                         #[inline(always)]
                         |rgba| {
+                            // Whole words: vectors are made of them more easily than of three bytes in four.
                             let word = u32::from_le_bytes(rgba);
-                            [word as u8, (word >> 8) as u8, (word >> 16) as u8]
+                            luma([word as u8, (word >> 8) as u8, (word >> 16) as u8])
                         },
                     );
                 },
@@ -175,24 +173,6 @@ impl Gray {
     }
 }
 
-/// Adds the luma of pixels of N channels.
-fn add_luma<const N: usize>(
-    pixels: &[[u8; N]],
-    out: &mut Vec<u8>,
-    color: impl Fn([u8; N]) -> [u8; 3],
-) {
-    let start = out.len();
-    out.resize(start + pixels.len(), 0);
-    vectorized(
-        #[inline(always)]
-        || {
-            for (out, &pixel) in out[start..].iter_mut().zip(pixels) {
-                *out = luma(color(pixel));
-            }
-        },
-    );
-}
-
 impl Rgb {
     /// Decodes a PNG as [`from_png`](Self::from_png) or a JPEG as [`from_jpeg`](Self::from_jpeg), whichever its first
     /// bytes say it is. Other kinds of files are [`Error::Unsupported`], with their name where it is known.
@@ -216,16 +196,31 @@ impl Rgb {
         let (width, height, pixels) =
             decode_eight_bits(bytes, limits, |channels| match channels {
                 1 => |row: &[u8], out: &mut Vec<[u8; 3]>| {
-                    out.extend(row.iter().map(|&gray| [gray; 3]))
+                    extend(
+                        out,
+                        row,
+                        #[inline(always)]
+                        |gray| [gray; 3],
+                    );
                 },
                 2 => |row: &[u8], out: &mut Vec<[u8; 3]>| {
-                    out.extend(row.as_chunks::<2>().0.iter().map(|&[gray, _]| [gray; 3]));
+                    extend(
+                        out,
+                        row.as_chunks::<2>().0,
+                        #[inline(always)]
+                        |[gray, _]| [gray; 3],
+                    );
                 },
                 3 => |row: &[u8], out: &mut Vec<[u8; 3]>| {
                     out.extend_from_slice(row.as_chunks::<3>().0)
                 },
                 _ => |row: &[u8], out: &mut Vec<[u8; 3]>| {
-                    out.extend(row.as_chunks::<4>().0.iter().map(|&[r, g, b, _]| [r, g, b]));
+                    extend(
+                        out,
+                        row.as_chunks::<4>().0,
+                        #[inline(always)]
+                        |[r, g, b, _]| [r, g, b],
+                    );
                 },
             })?;
         Ok(Self::new(width, height, pixels))
@@ -247,12 +242,15 @@ impl DepthMap {
                 return Err(not_depth(&format!("{color:?}")));
             }
             Ok(Box::new(move |row: &[u8], out: &mut Vec<f32>| {
-                out.extend(row.as_chunks::<2>().0.iter().map(|&sample| {
-                    match u16::from_be_bytes(sample) {
+                extend(
+                    out,
+                    row.as_chunks::<2>().0,
+                    #[inline(always)]
+                    |sample| match u16::from_be_bytes(sample) {
                         0 => f32::NAN,
                         count => (f64::from(count) * unit_m) as f32,
-                    }
-                }));
+                    },
+                );
             }))
         })?;
         Ok(Self::new(width, height, depth_m))

@@ -19,6 +19,24 @@ pub use depth_map::DepthMap;
 pub use gray::Gray;
 pub use rgb::Rgb;
 
+use crate::solve::vectorized;
+
+/// Adds every pixel, converted. Pixels are many: as vectors, which `convert` is part of where it is
+/// `#[inline(always)]`.
+fn extend<A: Copy, B: Copy + Default>(out: &mut Vec<B>, pixels: &[A], convert: impl Fn(A) -> B) {
+    let start = out.len();
+    out.resize(start + pixels.len(), B::default());
+    let out = &mut out[start..];
+    vectorized(
+        #[inline(always)]
+        || {
+            for (out, &pixel) in out.iter_mut().zip(pixels) {
+                *out = convert(pixel);
+            }
+        },
+    );
+}
+
 /// Every row the other way round.
 fn mirrored<T: Copy>(width: usize, pixels: &[T]) -> Vec<T> {
     pixels.chunks(width.max(1)).flat_map(|row| row.iter().rev().copied()).collect()

@@ -1,6 +1,6 @@
 //! Colour images.
 
-use super::Gray;
+use super::{Gray, extend};
 
 /// An 8-bit sRGB image.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,7 +39,9 @@ impl Rgb {
 
     /// The luma of ITU-R BT.601, as OpenCV's `COLOR_RGB2GRAY` rounds it.
     pub fn to_gray(&self) -> Gray {
-        Gray::new(self.width, self.height, self.pixels.iter().map(|&p| luma(p)).collect())
+        let mut gray = Vec::new();
+        extend(&mut gray, &self.pixels, luma);
+        Gray::new(self.width, self.height, gray)
     }
 }
 
