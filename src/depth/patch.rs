@@ -1,12 +1,14 @@
 //! The board's whole surface in a depth map, reduced to some hundred patches.
 
+use fearless_simd::{Level, Simd, dispatch, f64x8, prelude::*};
+
 use super::{CornerDepth, Texture};
 use crate::{
     board::CharucoBoard,
     detect::Corner,
     geom::{Homography, Pixel},
     image::DepthMap,
-    solve::median,
+    solve::{LANES, median, sum},
 };
 
 /// A small square of a depth map: one plane's worth of depth.
@@ -131,7 +133,7 @@ pub fn patches(map: &DepthMap, board: &CharucoBoard, corners: &[Corner]) -> Opti
         texture: Texture::new(map, [left, top], [width, height]),
     };
     let mut levels_m = Vec::new();
-    let mut samples = Vec::with_capacity(side_px * side_px);
+    let mut samples = Samples::new(side_px);
     // A grid fixed to the image, so that patches of all frames lie at the same places.
     for y in (top / side_px * side_px..height).step_by(side_px) {
         for x in (left / side_px * side_px..width).step_by(side_px) {
@@ -144,22 +146,17 @@ pub fn patches(map: &DepthMap, board: &CharucoBoard, corners: &[Corner]) -> Opti
                 continue;
             }
             let middle = Pixel::new(0.5 * (x + x1) as f64, 0.5 * (y + y1) as f64);
-            samples.clear();
+            // Every so many of the pixels along both diagonals.
             for row in y..=y1 {
-                for column in x..=x1 {
-                    let stored_m = map.at(column, row);
-                    let depth_m = f64::from(stored_m);
-                    if depth_m > 0.0 {
-                        if (column + row).is_multiple_of(LEVEL_STRIDE) {
-                            levels_m.push(stored_m);
-                        }
-                        let (dx, dy) = (column as f64 - middle.x, row as f64 - middle.y);
-                        samples.push([dx, dy, depth_m.recip()]);
-                    }
-                }
+                let first = x + (LEVEL_STRIDE - (x + row) % LEVEL_STRIDE) % LEVEL_STRIDE;
+                let stored = (first..=x1).step_by(LEVEL_STRIDE).map(|column| map.at(column, row));
+                levels_m.extend(stored.filter(|&stored_m| stored_m > 0.0));
             }
-            let n_holes = side_px * side_px - samples.len();
-            match patch(middle, &samples, n_holes).filter(|p| 2 * p.n >= side_px * side_px) {
+            let (fitted, n_holes) = dispatch!(Level::new(), simd => {
+                let n_holes = samples.fill(map, x, y);
+                (patch(simd, middle, &samples, n_holes), n_holes)
+            });
+            match fitted.filter(|p| 2 * p.n >= side_px * side_px) {
                 Some(patch) => patches.measured.push(patch),
                 None => patches.torn.push((middle, n_holes)),
             }
@@ -178,14 +175,44 @@ fn outline(low: f64, right: f64, bottom: f64) -> impl Iterator<Item = Pixel> {
     })
 }
 
+/// The pixels of a patch, in rows of whole vectors.
+struct Samples {
+    side: usize,
+    /// Numbers in a row: a multiple of [`LANES`].
+    stride: usize,
+    /// 1/depth, per metre; 0 where there is no measurement, and after the row's last pixel.
+    inverse_per_m: Vec<f64>,
+}
+
+impl Samples {
+    fn new(side: usize) -> Self {
+        let stride = side.next_multiple_of(LANES);
+        Self { side, stride, inverse_per_m: vec![0.0; stride * side] }
+    }
+
+    /// Takes the pixels of the patch that begins at (x, y); says how many have no measurement.
+    #[inline(always)]
+    fn fill(&mut self, map: &DepthMap, x: usize, y: usize) -> usize {
+        let mut n_holes = 0;
+        for (row, out) in self.inverse_per_m.chunks_exact_mut(self.stride).enumerate() {
+            let depths_m = &map.depth_m()[(y + row) * map.width() + x..][..self.side];
+            for (out, &depth_m) in out.iter_mut().zip(depths_m) {
+                let is_measured = depth_m > 0.0;
+                n_holes += usize::from(!is_measured);
+                *out = if is_measured { f64::from(depth_m).recip() } else { 0.0 };
+            }
+        }
+        n_holes
+    }
+}
+
 /// Fits 1/depth = a + b·x + c·y twice: the second time without pixels far off the first plane.
-fn patch(middle: Pixel, samples: &[[f64; 3]], n_holes: usize) -> Option<Patch> {
-    let first = Moments::of(samples.first()?[2], samples, |_| true);
-    let plane = first.plane()?;
-    let Plane { at: [x, y, w], slope: [b, c], sigma } = plane;
-    let reach = OUTLIER_SIGMAS * sigma.max(LEAST_NOISE_M * w.powi(2));
-    let near = |s: &[f64; 3]| (s[2] - w - b * (s[0] - x) - c * (s[1] - y)).abs() <= reach;
-    let second = Moments::of(w, samples, near);
+#[inline(always)]
+fn patch<I: Simd>(simd: I, middle: Pixel, samples: &Samples, n_holes: usize) -> Option<Patch> {
+    let origin = *samples.inverse_per_m.iter().find(|&&w| w > 0.0)?;
+    let plane = Moments::of(simd, samples, origin, None).plane()?;
+    let reach = OUTLIER_SIGMAS * plane.sigma.max(LEAST_NOISE_M * plane.at[2].powi(2));
+    let second = Moments::of(simd, samples, plane.at[2], Some((&plane, reach)));
     let Plane { at: [x, y, inverse_per_m], sigma, .. } = second.plane()?;
     Some(Patch {
         at: Pixel::new(middle.x + x, middle.y + y),
@@ -197,7 +224,8 @@ fn patch(middle: Pixel, samples: &[[f64; 3]], n_holes: usize) -> Option<Patch> {
     })
 }
 
-/// Sums over samples (x, y, w), w from a value near all of them: what is squared is small.
+/// Sums over samples (x, y, w): pixels from the patch's middle, and w from a value near all of them, so that what is
+/// squared is small.
 struct Moments {
     origin: f64,
     n: f64,
@@ -214,23 +242,37 @@ struct Plane {
 }
 
 impl Moments {
-    fn of(origin: f64, samples: &[[f64; 3]], counts: impl Fn(&[f64; 3]) -> bool) -> Self {
-        let mut moments = Self { origin, n: 0.0, sum: [0.0; 3], products: [0.0; 6] };
-        for sample in samples {
-            // Multiplied by 0 instead of passed over: no branch that depends on noise.
-            let share = f64::from(u8::from(counts(sample)));
-            let [x, y, w] = [sample[0], sample[1], sample[2] - origin];
-            let of = [share * x, share * y, share * w];
-            moments.n += share;
-            for (sum, value) in moments.sum.iter_mut().zip(of) {
-                *sum += value;
-            }
-            let products = [of[0] * x, of[0] * y, of[1] * y, of[0] * w, of[1] * w, of[2] * w];
-            for (sum, value) in moments.products.iter_mut().zip(products) {
-                *sum += value;
+    /// Over all samples, or those within a distance of a plane.
+    #[inline(always)]
+    fn of<I: Simd>(simd: I, samples: &Samples, origin: f64, near: Option<(&Plane, f64)>) -> Self {
+        let splat = |v: f64| f64x8::splat(simd, v);
+        let (zero, one) = (splat(0.0), splat(1.0));
+        let middle = 0.5 * (samples.side as f64 - 1.0);
+        let ramp = f64x8::from_fn(simd, |k| k as f64);
+        let mut sums = [zero; 10];
+        for (row, values) in samples.inverse_per_m.chunks_exact(samples.stride).enumerate() {
+            let y = splat(row as f64 - middle);
+            for (chunk, values) in values.as_chunks::<LANES>().0.iter().enumerate() {
+                let stored = f64x8::simd_from(simd, *values);
+                let x = ramp + ((chunk * LANES) as f64 - middle);
+                // Multiplied by 0 instead of passed over: no branch that depends on noise.
+                let mut share = stored.simd_gt(zero).select(one, zero);
+                if let Some((plane, reach)) = near {
+                    let [px, py, pw] = plane.at;
+                    let [b, c] = plane.slope;
+                    let off = (stored - pw) - (x - px) * b - (y - py) * c;
+                    share = off.abs().simd_le(splat(reach)).select(share, zero);
+                }
+                let w = stored - origin;
+                let [sx, sy, sw] = [share * x, share * y, share * w];
+                let of = [share, sx, sy, sw, sx * x, sx * y, sy * y, sx * w, sy * w, sw * w];
+                for (sum, value) in sums.iter_mut().zip(of) {
+                    *sum += value;
+                }
             }
         }
-        moments
+        let [n, x, y, w, products @ ..] = sums.map(sum);
+        Self { origin, n, sum: [x, y, w], products }
     }
 
     /// `None` for fewer than 8 samples or samples on one line.
