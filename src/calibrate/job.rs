@@ -196,6 +196,7 @@ fn assemble(
         (0..names.len()).flat_map(|i| whole[i * n..i * n + names.len()].iter().copied()).collect();
     let form = fit.form(&shape);
     let camera = shape.camera(input.factory, input.tables, &fit.free);
+    let plane = prepared.sheet.plane_pose(shape.surface, &form);
     let mut views = Vec::with_capacity(prepared.views.len());
     let (mut squares, mut n_corners) = (0.0, 0);
     for (view, pose) in prepared.views.iter().zip(&fit.poses) {
@@ -208,8 +209,10 @@ fn assemble(
                 prepared.sheet.lifted(shape.surface, (corner.id, point), numbers)
             })
             .collect();
-        let view = View::at_pose_of(view.frame, &points, &camera, &view.corners, *pose)
+        let mut view = View::at_pose_of(view.frame, &points, &camera, &view.corners, *pose)
             .map_err(|_| undetermined())?;
+        // Heights count from the board's own plane, and so must poses.
+        view.color_from_board = view.color_from_board * plane;
         squares += view.rms_px * view.rms_px * view.corners.len() as f64;
         n_corners += view.corners.len();
         views.push(view);

@@ -92,6 +92,7 @@ use crate::{
     board::CharucoBoard,
     camera::{Camera, Intrinsics, TablePair},
     detect::Corner,
+    geom::{Board, Point},
     pose::View,
 };
 
@@ -305,6 +306,20 @@ pub struct BoardSurface {
 }
 
 impl BoardSurface {
+    /// Where a corner lies on the board as it is, in the frame of its own plane: as the poses of
+    /// [`Calibration::views`] have it.
+    pub fn corner(&self, board: &CharucoBoard, id: usize) -> Point<Board> {
+        let flat = board.corner(id);
+        let [x, y] = [(flat.x(), board.squares_x), (flat.y(), board.squares_y)]
+            .map(|(at_m, squares)| at_m - 0.5 * squares as f64 * board.square_m);
+        let [stretch, shear] = self.print.map_or([0.0; 2], |print| print.map(|e| e.value));
+        Point::new(
+            flat.x() + stretch * x + shear * y,
+            flat.y() - stretch * y + shear * x,
+            self.heights_m[id],
+        )
+    }
+
     /// From the lowest to the highest corner, metres.
     pub fn peak_to_valley_m(&self) -> f64 {
         let high = self.heights_m.iter().copied().fold(f64::NEG_INFINITY, f64::max);

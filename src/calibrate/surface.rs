@@ -4,7 +4,7 @@ use super::{BoardSurface, Estimate, SurfaceKind};
 use crate::{
     board::CharucoBoard,
     camera::Real,
-    geom::{Board, Matrix3, Point, Vector3},
+    geom::{Board, Matrix3, Point, Pose, Rotation, Vector3},
     solve::{DenseCholesky, Mixture},
 };
 
@@ -238,6 +238,19 @@ impl Sheet {
                 [plane.z, -plane.y, 0.0, 0.0, 0.0, plane.x]
             })
             .collect()
+    }
+
+    /// The board's own plane (the best one through its corners) in the frame that these numbers count heights from:
+    /// its pose beside that of the frame.
+    pub(super) fn plane_pose(&self, surface: Surface, form: &Form) -> Pose<Board, Board> {
+        let numbers = form.shared.iter().chain(&form.knots_m);
+        let mut step = [0.0; 6];
+        for (by, number) in self.plane_steps(surface).iter().zip(numbers) {
+            step.iter_mut().zip(by).for_each(|(sum, by)| *sum += by * number);
+        }
+        let [x, y, z] = [step[0], step[1], step[2]];
+        let turned = Rotation::from_scaled_axis(Vector3::new(x, y, z));
+        Pose::new(turned, Vector3::new(step[3], step[4], step[5]))
     }
 
     /// The board's shape, from its numbers and the covariance of all free numbers (row-major, the surface's last);

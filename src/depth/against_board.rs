@@ -93,11 +93,7 @@ pub(crate) fn corner_on(
     surface: Option<&BoardSurface>,
     id: usize,
 ) -> Point<Board> {
-    let mut point = board.corner(id);
-    if let Some(surface) = surface {
-        point.coords.z += surface.heights_m[id];
-    }
-    point
+    surface.map_or_else(|| board.corner(id), |surface| surface.corner(board, id))
 }
 
 fn frame_depth(
