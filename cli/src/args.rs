@@ -309,6 +309,13 @@ pub(crate) struct AuditArgs {
     #[arg(long, default_value = "auto")]
     pub(crate) method: Method,
 
+    /// Calibrate from at most so many views: of more, those that together tell most about the camera
+    ///
+    /// Depth is compared in all frames of these views. --method paper takes all.
+    #[arg(long, value_name = "N", default_value_t = truedepth::calibrate::MAX_VIEWS, value_parser = at_least_three)]
+    #[arg(conflicts_with = "calibration")]
+    pub(crate) views: usize,
+
     #[command(flatten)]
     pub(crate) input: InputArgs,
 

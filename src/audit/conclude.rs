@@ -119,7 +119,7 @@ pub(super) fn conclude(
     let n_frames = frames.len();
 
     observer(Progress { stage: Stage::Calibrate, done: 0, total: 1 });
-    let own = own_camera(ground, &options.method, &board, &frames)?;
+    let own = own_camera(ground, options, &board, &frames)?;
     observer(Progress { stage: Stage::Calibrate, done: 1, total: 1 });
 
     observer(Progress { stage: Stage::Judge, done: 0, total: 1 });
@@ -321,12 +321,12 @@ impl Own {
 
 fn own_camera(
     ground: &Ground<'_>,
-    method: &Method,
+    options: &Options,
     board: &CharucoBoard,
     frames: &[FrameAudit],
 ) -> Result<Own, Error> {
     let size_px = frames.iter().find_map(|f| f.size_px);
-    let method = match method {
+    let method = match &options.method {
         Method::Given(camera) => {
             if let Some(size) = size_px {
                 camera.check_size(size, ground.place)?;
@@ -344,7 +344,8 @@ fn own_camera(
     let Some(factory) = ground.factory else {
         return why_not("the recording has no factory intrinsics to start from".to_owned());
     };
-    match calibrate::calibrate(&input(factory, board, &frames), method) {
+    let input = input(factory, board, &frames);
+    match calibrate::calibrate_from(&input, method, options.max_views) {
         Ok(calibration) => Ok(Own {
             camera: Some(calibration.camera.clone()),
             calibration: Some(calibration),

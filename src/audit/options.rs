@@ -1,6 +1,6 @@
 //! What the shells choose, and what they are told on the way.
 
-use crate::{board::CharucoBoard, camera::Camera, diagnose::Tolerances};
+use crate::{board::CharucoBoard, calibrate::MAX_VIEWS, camera::Camera, diagnose::Tolerances};
 
 /// Where the own intrinsics come from.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,12 +33,14 @@ pub struct Options {
     pub board: Option<CharucoBoard>,
     /// What still counts as true.
     pub tolerances: Tolerances,
+    /// Calibrate from so many views at most, as [`calibrate_from`](crate::calibrate::calibrate_from).
+    pub max_views: usize,
 }
 
 impl Options {
-    /// This method, the recording's board, default tolerances.
+    /// This method, the recording's board, default tolerances, views as many as calibrations take.
     pub fn new(method: Method) -> Self {
-        Self { method, board: None, tolerances: Tolerances::default() }
+        Self { method, board: None, tolerances: Tolerances::default(), max_views: MAX_VIEWS }
     }
 }
 

@@ -75,6 +75,7 @@ fn options(args: &AuditArgs) -> Result<Options, Failure> {
         (None, args::Method::Paper) => Method::Paper,
     };
     let mut options = Options::new(method);
+    options.max_views = args.views;
     options.board = input::board(&args.input.board)?;
     for tolerance in &args.tolerances {
         match *tolerance {

@@ -50,6 +50,16 @@ fn json_is_all_there_is_on_stdout() {
 }
 
 #[test]
+fn views_that_cannot_disagree_are_refused() {
+    let scratch = Scratch::new();
+    scratch.blank_recording("rec");
+    let run = truedepth_in(scratch.path(), ["audit", "rec", "--views", "2"]);
+    run.code(2).says(&["--views", "at least 3 views"]);
+    let run = truedepth_in(scratch.path(), ["audit", "rec", "--views", "9", "--json"]);
+    assert!(matches!(run.code, Some(0 | 3)), "{run:#?}");
+}
+
+#[test]
 fn somebody_elses_folder_is_refused_before_the_work() {
     let scratch = Scratch::new();
     scratch.blank_recording("rec");
