@@ -87,6 +87,15 @@ fn errors(plan: &Plan, audit: &Audit) -> Vec<(&'static str, f64, f64)> {
         add("zoom", found.zoom, truth.depth.zoom);
         add("shift x, px", found.shift_px[0], truth.depth.shift_px[0]);
         add("shift y, px", found.shift_px[1], truth.depth.shift_px[1]);
+        // Each witness for itself.
+        add("zoom, slopes", found.slopes.zoom, truth.depth.zoom);
+        add("shift x, slopes", found.slopes.shift_px[0], truth.depth.shift_px[0]);
+        add("shift y, slopes", found.slopes.shift_px[1], truth.depth.shift_px[1]);
+        if let Some(print) = &found.imprint {
+            add("zoom, print", print.zoom, truth.depth.zoom);
+            add("shift x, print", print.shift_px[0], truth.depth.shift_px[0]);
+            add("shift y, print", print.shift_px[1], truth.depth.shift_px[1]);
+        }
     }
     errors
 }

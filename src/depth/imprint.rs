@@ -1,8 +1,10 @@
 //! The print, seen in the depth map: a second witness of zoom and shift.
 
-use nalgebra::{Matrix2, Matrix3, Matrix4, Matrix5, Vector2, Vector3, Vector4, Vector5};
+use nalgebra::{
+    Cholesky, Matrix2, Matrix3, Matrix5, SMatrix, SVector, Vector2, Vector3, Vector4, Vector5,
+};
 
-use super::{rays::RayGrid, register::LensPlace};
+use super::{join::Seen, rays::RayGrid};
 
 use crate::{
     board::{CharucoBoard, Layout},
@@ -30,6 +32,15 @@ pub struct Imprint {
     pub contrast_m: Estimate,
     /// Frames that took part.
     pub n_frames: usize,
+}
+
+/// What the print says; frames are counted as the textures are.
+pub(super) struct PrintSeen {
+    pub(super) imprint: Imprint,
+    /// Zoom and shift (px).
+    pub(super) place: Seen<3>,
+    /// Zoom, shift (px) and the share of the other distortion state.
+    pub(super) with_lens: Option<Seen<4>>,
 }
 
 /// What the choice of the neighbourhood moves zoom and shift (px) by: on the published recordings, 25 or 65 pixels
@@ -322,6 +333,7 @@ pub(super) struct Spot {
 /// A frame's normal equations: contrast (metres), and contrast times what zoom, shift and the share of the other
 /// distortion state are off.
 struct Normal {
+    frame: usize,
     information: Matrix5<f64>,
     score: Vector5<f64>,
 }
@@ -330,7 +342,7 @@ impl Normal {
     /// Cells where they look now, compared with their neighbours.
     fn new(
         print: &Print,
-        texture: &Texture,
+        (frame, texture): (usize, &Texture),
         place: &Place,
         look: impl Fn(Pixel) -> Option<Spot>,
         lens: Option<&RayGrid>,
@@ -372,7 +384,7 @@ impl Normal {
         if rows.len() < LEAST_CELLS || !(sigma > 0.0) {
             return None;
         }
-        let mut normal = Self { information: Matrix5::zeros(), score: Vector5::zeros() };
+        let mut normal = Self { frame, information: Matrix5::zeros(), score: Vector5::zeros() };
         for (residual, row) in rows {
             let u = residual / (TUKEY * sigma);
             if u.abs() < 1.0 {
@@ -408,37 +420,44 @@ impl Place {
     }
 }
 
-/// What these frames' normal equations say: contrast, and what zoom and shift are off.
-fn solve(information: &Matrix5<f64>, score: &Vector5<f64>) -> Option<(f64, Vector3<f64>)> {
-    let information = information.fixed_view::<4, 4>(0, 0).into_owned();
-    let solved = information.cholesky()?.solve(&score.fixed_rows::<4>(0).into_owned());
-    Some((solved[0], solved.fixed_rows::<3>(1) / solved[0]))
+/// What these frames' normal equations say: contrast (metres), and what zoom, shift and, of five numbers, the share of
+/// the other state are off.
+fn solve<const M: usize>(
+    information: &Matrix5<f64>,
+    score: &Vector5<f64>,
+) -> Option<SVector<f64, M>> {
+    let information = information.fixed_view::<M, M>(0, 0).into_owned();
+    let mut solved = Cholesky::new(information)?.solve(&score.fixed_rows::<M>(0).into_owned());
+    let contrast_m = solved[0];
+    solved.iter_mut().skip(1).for_each(|off| *off /= contrast_m);
+    Some(solved)
 }
 
-/// What zoom, shift and the share of the other state are off, together.
-fn solve_lens(information: &Matrix5<f64>, score: &Vector5<f64>) -> Option<Vector4<f64>> {
-    let solved = information.cholesky()?.solve(score);
-    Some(solved.fixed_rows::<4>(1) / solved[0])
+/// What the frames say at the best place.
+struct Best<const M: usize> {
+    place: Place,
+    contrast_m: f64,
+    /// Of contrast (metres), zoom, shift and, of five numbers, the share of the other state.
+    covariance: SMatrix<f64, M, M>,
+    /// By how much each frame moves them.
+    by_frame: Vec<(usize, SVector<f64, M>)>,
 }
 
-/// Zoom, shift and share together, from the best place on; `None` where they are not determined.
-fn find_lens(look: &Looks<'_>, start: Place) -> Option<LensPlace> {
-    let (place, normals) = look.converge(start, true)?;
-    let (information, score) = total(&normals);
-    let off = solve_lens(&information, &score)?;
-    let mut covariance = Matrix4::zeros();
-    let n = normals.len() as f64;
-    for normal in &normals {
-        let without = solve_lens(&(information - normal.information), &(score - normal.score))?;
-        let change = without - off;
-        covariance.ger((n - 1.0) / n, &change, &change, 1.0);
+impl<const M: usize> Best<M> {
+    /// Without contrast.
+    fn seen<const K: usize>(&self) -> Seen<K> {
+        let [x, y] = self.place.shift_px;
+        let place = Vector4::new(self.place.zoom, x, y, self.place.lens);
+        let rows =
+            |(frame, by): &(usize, SVector<f64, M>)| (*frame, by.fixed_rows::<K>(1).into_owned());
+        Seen {
+            found: (
+                place.fixed_rows::<K>(0).into_owned(),
+                self.covariance.fixed_view::<K, K>(1, 1).into_owned(),
+            ),
+            by_frame: self.by_frame.iter().map(rows).collect(),
+        }
     }
-    for (k, sigma) in NEIGHBOURHOOD_SIGMA.into_iter().chain([NEIGHBOURHOOD_SIGMA_LENS]).enumerate()
-    {
-        covariance[(k, k)] += sigma * sigma;
-    }
-    let [dx, dy] = place.shift_px;
-    Some((Vector4::new(place.zoom, dx, dy, place.lens), covariance))
 }
 
 /// What is looked at.
@@ -450,14 +469,38 @@ struct Looks<'a> {
 }
 
 impl Looks<'_> {
-    /// The best place and the normal equations there, from one that is right within half a square.
-    fn converge(&self, start: Place, with_lens: bool) -> Option<(Place, Vec<Normal>)> {
+    /// The best place, from one that is right within half a square, and its covariance by leaving out each frame in
+    /// turn (jackknife). With M = 5 the share of the other distortion state is free.
+    fn best<const M: usize>(&self, start: Place) -> Option<Best<M>> {
+        let (place, normals) = self.converge::<M>(start)?;
+        let (information, score) = total(&normals);
+        let all = solve::<M>(&information, &score)?;
+        let n = normals.len() as f64;
+        let by_frame = normals
+            .iter()
+            .map(|normal| {
+                let others = (information - normal.information, score - normal.score);
+                let without = solve::<M>(&others.0, &others.1)?;
+                Some((normal.frame, (all - without) * ((n - 1.0) / n).sqrt()))
+            })
+            .collect::<Option<Vec<_>>>()?;
+        let mut covariance = SMatrix::<f64, M, M>::zeros();
+        by_frame.iter().for_each(|(_, by)| covariance.ger(1.0, by, by, 1.0));
+        let sigmas = NEIGHBOURHOOD_SIGMA.into_iter().chain([NEIGHBOURHOOD_SIGMA_LENS]);
+        for (k, sigma) in (1..M).zip(sigmas) {
+            covariance[(k, k)] += sigma * sigma;
+        }
+        Some(Best { place, contrast_m: all[0], covariance, by_frame })
+    }
+
+    /// The best place and the normal equations there.
+    fn converge<const M: usize>(&self, start: Place) -> Option<(Place, Vec<Normal>)> {
         let mut place = start;
         let mut normals: Vec<Normal> = Vec::new();
         for _ in 0..MAX_STEPS {
             let one = |i: usize| {
                 let spot = |pixel| (self.spot)(i, &place, pixel);
-                Normal::new(self.print, self.textures[i], &place, spot, self.lens)
+                Normal::new(self.print, (i, self.textures[i]), &place, spot, self.lens)
             };
             // Collected in order of frames, whatever the threads did.
             #[cfg(feature = "parallel")]
@@ -469,10 +512,8 @@ impl Looks<'_> {
             let each: Vec<Option<Normal>> = (0..self.textures.len()).map(one).collect();
             normals = each.into_iter().flatten().collect();
             let (information, score) = total(&normals);
-            let off = match with_lens {
-                true => solve_lens(&information, &score)?,
-                false => solve(&information, &score)?.1.push(0.0),
-            };
+            let solved = solve::<M>(&information, &score)?;
+            let off = Vector4::from_fn(|k, _| solved.get(k + 1).copied().unwrap_or(0.0));
             // A step longer than an edge is wide would leave what is linear.
             let longest =
                 (off.y.hypot(off.z) / 3.0).max(off.x.abs() / 0.02).max(off.w.abs() / 0.5).max(1.0);
@@ -499,41 +540,29 @@ pub(super) fn find(
     textures: &[&Texture],
     look: impl Fn(usize, &Place, Pixel) -> Option<Spot> + Sync,
     lens: Option<&RayGrid>,
-) -> Option<(Imprint, Option<LensPlace>)> {
-    let looks = Looks { print, textures, spot: &look, lens };
-    let (place, normals) = looks.converge(start, false)?;
-    let n = normals.len();
-    if n < LEAST_FRAMES {
+) -> Option<PrintSeen> {
+    let looks = Looks { print, textures, spot: &look, lens: None };
+    let best = looks.best::<4>(start)?;
+    let Best { place, contrast_m, covariance, by_frame } = &best;
+    let n_frames = by_frame.len();
+    if n_frames < LEAST_FRAMES {
         return None;
     }
-    let (information, score) = total(&normals);
-    let (contrast_m, off) = solve(&information, &score)?;
-    let mut covariance = Matrix3::zeros();
-    let mut variance = 0.0;
-    let share = (n as f64 - 1.0) / n as f64;
-    for normal in &normals {
-        let (without, place) = solve(&(information - normal.information), &(score - normal.score))?;
-        let change = place - off;
-        covariance.ger(share, &change, &change, 1.0);
-        variance += share * (without - contrast_m).powi(2);
-    }
-    let contrast_m = Estimate { value: contrast_m, sigma: variance.sqrt() };
+    let estimate =
+        |k: usize, value: f64| Estimate { value, sigma: covariance[(k, k)].max(0.0).sqrt() };
+    let contrast_m = estimate(0, *contrast_m);
     if !(contrast_m.value.abs() > LEAST_CONTRAST * contrast_m.sigma) {
         return None;
     }
-    for (k, sigma) in NEIGHBOURHOOD_SIGMA.into_iter().enumerate() {
-        covariance[(k, k)] += sigma * sigma;
-    }
-    let estimate = |k: usize, value: f64| Estimate { value, sigma: covariance[(k, k)].sqrt() };
-    let of_lens = lens.and_then(|_| find_lens(&looks, place));
+    let with_lens = lens.and_then(|_| Some(Looks { lens, ..looks }.best::<5>(*place)?.seen::<4>()));
     let imprint = Imprint {
-        zoom: estimate(0, place.zoom),
-        shift_px: [1, 2].map(|k| estimate(k, place.shift_px[k - 1])),
-        covariance: std::array::from_fn(|i| std::array::from_fn(|j| covariance[(i, j)])),
+        zoom: estimate(1, place.zoom),
+        shift_px: [2, 3].map(|k| estimate(k, place.shift_px[k - 2])),
+        covariance: std::array::from_fn(|i| std::array::from_fn(|j| covariance[(i + 1, j + 1)])),
         contrast_m,
-        n_frames: n,
+        n_frames,
     };
-    Some((imprint, of_lens))
+    Some(PrintSeen { imprint, place: best.seen::<3>(), with_lens })
 }
 
 fn total(normals: &[Normal]) -> (Matrix5<f64>, Vector5<f64>) {
@@ -612,7 +641,7 @@ mod tests {
         let textures: Vec<&Texture> = textures.iter().collect();
         let look = |frame: usize, place: &Place, at| Some(spot(frame, place.looked_at(at)));
         find(&Print::new(&board), place(1.0, [0.0; 2]), &textures, look, None)
-            .map(|(imprint, _)| imprint)
+            .map(|seen| seen.imprint)
     }
 
     /// From where it is looked for, six pixels at the board's rim.

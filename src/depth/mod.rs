@@ -39,6 +39,7 @@
 mod against_board;
 mod handedness;
 mod imprint;
+mod join;
 mod patch;
 mod pattern;
 mod rays;

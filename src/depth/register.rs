@@ -1,10 +1,11 @@
 //! Depth against colour, all views at once: scale, bias, zoom and shift of the sensor.
 
-use nalgebra::{Cholesky, Matrix2, Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{Cholesky, Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
 
 use super::{
     Patch, Patches,
     imprint::{self, Imprint, Place, Print, Spot, Texture},
+    join::{Joined, Seen, join},
     pattern::{Holes, MAX_INCIDENCE_DEG, NEAR_M, Pattern, Residual},
     rays::RayGrid,
     relief::Relief,
@@ -16,7 +17,7 @@ use crate::{
     camera::Camera,
     geom::Pixel,
     pose::View,
-    solve::mad_sigma,
+    solve::{Pooled, Reduced, larger, mad_sigma},
 };
 
 /// How the depth sensor stands to the colour camera and to the truth, from the board's whole surface in all views.
@@ -110,13 +111,20 @@ pub struct RegisterInput<'a> {
 /// See [`RegisterInput::other_state`].
 pub type OtherState<'a> = dyn Fn(Pixel) -> Option<Pixel> + Sync + 'a;
 
-const N: usize = 5;
+/// The unknowns: the plane by which the board's surface is not where its corners say (height of its middle, slopes
+/// along its rows and columns), then the five of [`Registration`]; the share of the other distortion state comes after
+/// these, where it is asked for.
+const N: usize = 8;
+const SCALE: usize = 3;
+const BIAS: usize = 4;
+const ZOOM: usize = 5;
+const SHIFT: [usize; 2] = [6, 7];
 type Numbers = SVector<f64, N>;
 type Square = SMatrix<f64, N, N>;
 
-/// Scale, bias (m), zoom and shift (px) that no recording is farther from the truth than by about this: keeps what
-/// the views do not determine from running away. Weak beside any recording that tells anything.
-const PRIOR_SIGMA: [f64; N] = [0.3, 0.1, 0.3, 60.0, 60.0];
+/// Scale, bias (m), zoom, shift (px) and share that no recording is farther from the truth than by about this: keeps
+/// what the views do not determine from running away. Weak beside any recording that tells anything.
+const PRIOR_SIGMA: [f64; 6] = [0.3, 0.1, 0.3, 60.0, 60.0, 3.0];
 /// Frames below this number of patches say nothing about a plane.
 const LEAST_PATCHES: usize = 12;
 /// Frames below this number do not even disagree.
@@ -147,9 +155,15 @@ const NOISE_GROWTH_PER_M: f64 = 2.2e-3;
 /// κ are found by restricted maximum likelihood, so that their sizes are what the frames scatter by. Residuals within
 /// a frame may be correlated in any way: they only count through β.
 ///
+/// **The board's rim** is not where it is thought to be where the board is wavy: its heights are known at the corners,
+/// and a third of its surface lies beyond the outermost of them. That error is the same in all frames, and so neither
+/// noise of the poses nor of the sensor: its plane is three more unknowns, known beforehand as well as the heights of
+/// the corners tell of what is beyond them ([`Relief::plane_covariance`]).
+///
 /// **σ** is the larger of this model's and of a sandwich estimator clustered by frame, and to it is added what the
 /// camera's own covariance does (poses and rays follow each number of the camera). Not in it: a wrong square length
-/// (the scale is wrong by as much), errors of the board's surface, and what a wrong camera *model* does.
+/// (the scale is wrong by as much), errors of the board's surface other than its plane, and what a wrong camera *model*
+/// does.
 pub fn register(input: &RegisterInput<'_>) -> Option<Registration> {
     let RegisterInput { board, camera, calibration, views, other_state } = *input;
     let surface = calibration.and_then(|c| c.surface.as_ref());
@@ -176,7 +190,8 @@ pub fn register(input: &RegisterInput<'_>) -> Option<Registration> {
         })
         .collect();
 
-    let mut theta = Numbers::from([1.0, 0.0, 1.0, 0.0, 0.0]);
+    let prior = Prior::new(scene.relief.plane_covariance());
+    let mut theta = prior.mean;
     let mut found = None;
     for _ in 0..12 {
         let planes: Vec<Plane> = frames
@@ -186,8 +201,9 @@ pub fn register(input: &RegisterInput<'_>) -> Option<Registration> {
         if planes.len() < LEAST_FRAMES {
             return None;
         }
-        let step = between_frames(&planes, &gains(&planes), &theta)?;
-        let size = step.delta.component_div(&Numbers::from(PRIOR_SIGMA)).amax();
+        let gains: Vec<_> = planes.iter().map(|plane| plane.gain).collect();
+        let step = between_frames(&planes, &gains, &theta, &prior)?;
+        let size = step.delta.component_div(&prior.sigma()).amax();
         theta += step.delta;
         found = Some((planes, step));
         if size < 1e-7 {
@@ -206,14 +222,22 @@ pub fn register(input: &RegisterInput<'_>) -> Option<Registration> {
     };
     let lens = scene.lens.as_ref();
     let print = Print::new(board);
-    let (imprint, lens_imprint) =
-        imprint::find(&print, scene.place(&theta), &textures, look, lens).unzip();
+    let print_seen = imprint::find(&print, scene.place(&theta), &textures, look, lens);
+    // Frames as the planes count them.
+    let of_frame = |texture: usize| frames[texture].0.frame;
     let lens_share = scene.lens.as_ref().and_then(|_| {
-        let slopes = lens_by_slopes(&planes, &theta, calibration)?;
-        Some(lens_by_both(slopes, lens_imprint.flatten()))
+        let slopes = lens_by_slopes(&planes, &theta, &scene.relief, calibration)?;
+        let seen = print_seen.as_ref().and_then(|seen| seen.with_lens.as_ref());
+        let both = seen.and_then(|seen| join(&slopes, ZOOM, seen, of_frame));
+        let (value, covariance) = both.map_or(slopes.found, |both| both.estimate);
+        Some(Estimate { value: value[N], sigma: covariance[(N, N)].max(0.0).sqrt() })
     });
-    let witnesses = Witnesses { step: &step, imprint, darkness: print.darkness, lens_share };
-    Some(assemble(input, &scene, &frames, &theta, (&planes, witnesses)))
+    let slopes = Seen { found: (theta, with_camera(&step, calibration)), by_frame: step.by_frame };
+    let (imprint, both) =
+        print_seen.map(|seen| (seen.imprint, join(&slopes, ZOOM, &seen.place, of_frame))).unzip();
+    let witnesses =
+        Witnesses { slopes, imprint, both: both.flatten(), darkness: print.darkness, lens_share };
+    Some(assemble(input, &scene, &frames, (&planes, witnesses)))
 }
 
 struct Scene<'a> {
@@ -226,6 +250,13 @@ struct Scene<'a> {
     lens: Option<RayGrid>,
 }
 
+/// Where a ray meets the board.
+struct Hit {
+    depth_m: f64,
+    /// How it changes with the plane by which the board's surface is not where its corners say.
+    by_board: Vector3<f64>,
+}
+
 /// A patch before the board.
 struct Sight {
     /// Depth of the board where the patch looks, metres.
@@ -234,7 +265,7 @@ struct Sight {
     residual_m: f64,
     /// By m.
     by_plane: Vector3<f64>,
-    /// By the five numbers.
+    /// By the unknowns.
     by_theta: Numbers,
     /// By the share of the other distortion state.
     by_lens: f64,
@@ -246,7 +277,7 @@ pub(super) struct Plane {
     frame: usize,
     /// By which plane the sensor differs from the model.
     beta: Vector3<f64>,
-    /// By the five numbers.
+    /// By the unknowns.
     gain: SMatrix<f64, 3, N>,
     /// By the share of the other distortion state.
     by_lens: Vector3<f64>,
@@ -266,44 +297,60 @@ impl Scene<'_> {
     }
 
     fn place(&self, theta: &Numbers) -> Place {
-        Place { center: self.center, zoom: theta[2], shift_px: [theta[3], theta[4]], lens: 0.0 }
+        let shift_px = SHIFT.map(|k| theta[k]);
+        Place { center: self.center, zoom: theta[ZOOM], shift_px, lens: 0.0 }
     }
 
     /// The board's depth along a ray; `None` beside the board.
     fn board_depth(&self, stance: &Stance, ray: [f64; 2]) -> Option<f64> {
+        Some(self.hit(stance, ray)?.depth_m)
+    }
+
+    /// Where a ray meets the board; `None` beside it.
+    fn hit(&self, stance: &Stance, ray: [f64; 2]) -> Option<Hit> {
         let ray = Vector3::new(ray[0], ray[1], 1.0);
         let flat_m = stance.plane.dot(&ray).recip();
         if !(flat_m > 0.0 && flat_m.is_finite()) {
             return None;
         }
-        let [width_m, height_m] =
+        let size_m =
             [self.board.squares_x, self.board.squares_y].map(|n| n as f64 * self.board.square_m);
         let pose = &stance.color_from_board;
         let on_board = pose.rotation.inverse() * (ray * flat_m - pose.translation);
         let inside = |x: f64, size: f64| (0.0..=size).contains(&x);
-        if !(inside(on_board.x, width_m) && inside(on_board.y, height_m)) {
+        if !(inside(on_board.x, size_m[0]) && inside(on_board.y, size_m[1])) {
             return None;
         }
-        let height = self.relief.height_m(on_board.x, on_board.y);
-        Some(flat_m * (1.0 + height / stance.distance_m))
+        let height_m = self.relief.height_m(on_board.x, on_board.y);
+        let by_height = flat_m / stance.distance_m;
+        let from_middle = on_board.xy() - 0.5 * Vector2::from(size_m);
+        Some(Hit {
+            depth_m: flat_m + by_height * height_m,
+            by_board: by_height * Vector3::new(1.0, from_middle.x, from_middle.y),
+        })
     }
 
     fn sight(&self, stance: &Stance, patch: &Patch, theta: &Numbers) -> Option<Sight> {
         let at = patch.at;
         let p = self.looked_at(at, theta);
         let (ray, [by_x, by_y]) = self.rays.at(p)?;
-        let board_m = self.board_depth(stance, ray)?;
-        let (scale, bias_m, zoom) = (theta[0], theta[1], theta[2]);
+        let Hit { depth_m, by_board } = self.hit(stance, ray)?;
+        let board_m = depth_m + by_board.dot(&theta.fixed_rows::<3>(0));
+        let (scale, bias_m, zoom) = (theta[SCALE], theta[BIAS], theta[ZOOM]);
         let square = board_m * board_m;
         let m = &stance.plane;
         let slope = [by_x, by_y].map(|by| -square * (m.x * by[0] + m.y * by[1]));
         let lens = self.lens.as_ref().and_then(|grid| grid.at(p)).map_or([0.0; 2], |(by, _)| by);
-        let from_center = [at.x - theta[3] - self.center.x, at.y - theta[4] - self.center.y];
+        let from_center =
+            [at.x - theta[SHIFT[0]] - self.center.x, at.y - theta[SHIFT[1]] - self.center.y];
         Some(Sight {
             board_m,
             residual_m: patch.inverse_per_m.recip() - (scale * board_m + bias_m),
             by_plane: -scale * square * Vector3::new(ray[0], ray[1], 1.0),
             by_theta: Numbers::from([
+                scale * by_board.x,
+                scale * by_board.y,
+                scale * by_board.z,
                 board_m,
                 1.0,
                 scale * (slope[0] * from_center[0] + slope[1] * from_center[1]),
@@ -338,7 +385,7 @@ impl Scene<'_> {
             .iter()
             // At the very rim of board or lens it may be beside it: nothing is known there.
             .map(|[up, down]| {
-                depth(up).zip(depth(down)).map_or(0.0, |(up, down)| theta[0] * (up - down))
+                depth(up).zip(depth(down)).map_or(0.0, |(up, down)| theta[SCALE] * (up - down))
             })
             .collect()
     }
@@ -453,10 +500,12 @@ fn noise_m(board_m: f64) -> f64 {
     NOISE_FLOOR_M.hypot(board_m * board_m * NOISE_GROWTH_PER_M)
 }
 
-/// The second level, for M unknowns: the five, or the share of the other distortion state beside them.
+/// The second level, for M unknowns: all but the share of the other distortion state, or with it.
 struct Step<const M: usize> {
     delta: SVector<f64, M>,
     covariance: SMatrix<f64, M, M>,
+    /// By how much each frame (index in the recording) moves them.
+    by_frame: Vec<(usize, SVector<f64, M>)>,
     /// What one σ of each of the camera's numbers does to them.
     by_camera: Vec<SVector<f64, M>>,
 }
@@ -464,59 +513,77 @@ struct Step<const M: usize> {
 /// What each of the unknowns does to each frame's plane.
 type Gains<const M: usize> = [SMatrix<f64, 3, M>];
 
-fn gains(planes: &[Plane]) -> Vec<SMatrix<f64, 3, N>> {
-    planes.iter().map(|plane| plane.gain).collect()
+/// What is known of the unknowns before anything was measured.
+struct Prior<const M: usize> {
+    mean: SVector<f64, M>,
+    covariance: SMatrix<f64, M, M>,
+    precision: SMatrix<f64, M, M>,
 }
 
-/// What keeps an unknown from running away: where it starts, and the σ about that. The share of the other state is
-/// between 0 and 1.
-fn prior<const M: usize>() -> [(f64, f64); M] {
-    let start = [1.0, 0.0, 1.0, 0.0, 0.0, 0.0];
-    let sigma = |k: usize| PRIOR_SIGMA.get(k).copied().unwrap_or(3.0);
-    std::array::from_fn(|k| (start[k], sigma(k)))
+impl<const M: usize> Prior<M> {
+    fn new(of_board: Matrix3<f64>) -> Self {
+        let mut mean = SVector::zeros();
+        (mean[SCALE], mean[ZOOM]) = (1.0, 1.0);
+        let sigma = |k: usize| PRIOR_SIGMA[k.saturating_sub(SCALE)];
+        let mut covariance =
+            SMatrix::<f64, M, M>::from_diagonal(&SVector::from_fn(|k, _| sigma(k).powi(2)));
+        covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&of_board);
+        let precision = covariance.try_inverse().expect("a covariance");
+        Self { mean, covariance, precision }
+    }
+
+    fn sigma(&self) -> SVector<f64, M> {
+        self.covariance.diagonal().map(f64::sqrt)
+    }
 }
 
 fn between_frames<const M: usize>(
     planes: &[Plane],
     gains: &Gains<M>,
     theta: &SVector<f64, M>,
+    prior: &Prior<M>,
 ) -> Option<Step<M>> {
     // How much the sensor adds to what the poses are unsure by: the ratio of greatest restricted likelihood.
     let (ratio, _) = (-16..=16)
         .map(|i| 10f64.powf(f64::from(i) / 4.0))
-        .filter_map(|ratio| Some((ratio, weigh(planes, gains, theta, ratio)?.likelihood)))
+        .filter_map(|ratio| Some((ratio, weigh(planes, gains, (theta, prior), ratio)?.likelihood)))
         .fold((1.0, f64::NEG_INFINITY), |best, each| if each.1 > best.1 { each } else { best });
-    let Weighed { delta, information, parts, variance, weights, .. } =
-        weigh(planes, gains, theta, ratio)?;
+    let Weighed { delta, information, parts, weights, .. } =
+        weigh(planes, gains, (theta, prior), ratio)?;
     let inverse = Cholesky::new(information)?.inverse();
-    let covariance = larger(inverse * variance, leave_one_out(&information, &parts));
+    let all = Reduced { information: information.as_slice().to_vec(), score: vec![0.0; M] };
+    // Without it where a frame alone determines a number.
+    let clustered = Pooled::new(&all, &parts)?.clustered(M).unwrap_or_default();
+    let covariance = SMatrix::from_column_slice(&larger(inverse.as_slice(), &clustered));
     let n_camera = planes.first().map_or(0, |p| p.by_camera.len());
     let by_camera = (0..n_camera)
         .map(|k| {
             let mut score = SVector::<f64, M>::zeros();
-            for ((plane, gain), (precision, w)) in planes.iter().zip(gains).zip(&weights) {
-                score += gain.transpose() * (precision * plane.by_camera[k]) * *w;
+            for ((plane, gain), precision) in planes.iter().zip(gains).zip(&weights) {
+                score += gain.transpose() * (precision * plane.by_camera[k]);
             }
             -(inverse * score)
         })
         .collect();
-    Some(Step { delta, covariance, by_camera })
+    let moved = |part: &Reduced| inverse * SVector::<f64, M>::from_column_slice(&part.score);
+    let by_frame = planes.iter().map(|plane| plane.frame).zip(parts.iter().map(moved)).collect();
+    Some(Step { delta, covariance, by_frame, by_camera })
 }
 
 struct Weighed<const M: usize> {
     delta: SVector<f64, M>,
     information: SMatrix<f64, M, M>,
     /// What each frame alone says: its information, and what it still asks for.
-    parts: Vec<(SMatrix<f64, M, M>, SVector<f64, M>)>,
-    variance: f64,
-    weights: Vec<(Matrix3<f64>, f64)>,
+    parts: Vec<Reduced>,
+    /// The precision of each frame's plane.
+    weights: Vec<Matrix3<f64>>,
     likelihood: f64,
 }
 
 fn weigh<const M: usize>(
     planes: &[Plane],
     gains: &Gains<M>,
-    theta: &SVector<f64, M>,
+    (theta, prior): (&SVector<f64, M>, &Prior<M>),
     ratio: f64,
 ) -> Option<Weighed<M>> {
     let inverses: Vec<(Matrix3<f64>, f64)> = planes
@@ -526,28 +593,23 @@ fn weigh<const M: usize>(
             Some((covariance.try_inverse()?, covariance.determinant().ln()))
         })
         .collect::<Option<_>>()?;
-    let mut weights = vec![1.0; planes.len()];
+    let n_numbers = (3 * planes.len()) as f64;
+    let mut robust = vec![1.0; planes.len()];
     let mut delta = SVector::<f64, M>::zeros();
     let mut variance = 1.0;
     let mut information = SMatrix::<f64, M, M>::zeros();
-    let prior = prior::<M>();
     for _ in 0..15 {
-        information = SMatrix::zeros();
-        let mut score = SVector::<f64, M>::zeros();
+        information = prior.precision;
+        let mut score = prior.precision * (prior.mean - theta);
         for (((plane, gain), (inverse, _)), w) in
-            planes.iter().zip(gains).zip(&inverses).zip(&weights)
+            planes.iter().zip(gains).zip(&inverses).zip(&robust)
         {
-            let weighted = gain.transpose() * inverse * *w;
+            let weighted = gain.transpose() * inverse * (*w / variance);
             information += weighted * gain;
             score += weighted * plane.beta;
         }
-        for (k, (start, sigma)) in prior.iter().enumerate() {
-            // The prior counts as data of variance κ².
-            let precision = variance * sigma.powi(-2);
-            information[(k, k)] += precision;
-            score[k] += precision * (start - theta[k]);
-        }
-        delta = Cholesky::new(information)?.solve(&score);
+        let factor = Cholesky::new(information)?;
+        delta = factor.solve(&score);
         let squares: Vec<f64> = planes
             .iter()
             .zip(gains)
@@ -557,55 +619,37 @@ fn weigh<const M: usize>(
                 e.dot(&(inverse * e))
             })
             .collect();
-        let freedom = (3 * planes.len()) as f64 - M as f64;
-        variance = squares.iter().zip(&weights).map(|(s, w)| s * w).sum::<f64>() / freedom.max(1.0);
-        for (w, s) in weights.iter_mut().zip(&squares) {
+        // What was known beforehand costs no freedom.
+        let n_found = M as f64 - factor.solve(&prior.precision).trace();
+        variance = squares.iter().zip(&robust).map(|(s, w)| s * w).sum::<f64>()
+            / (n_numbers - n_found).max(1.0);
+        for (w, s) in robust.iter_mut().zip(&squares) {
             *w = (FRAME_HUBER / (s / variance).sqrt()).min(1.0);
         }
     }
+    let n_found = M as f64 - Cholesky::new(information)?.solve(&prior.precision).trace();
     let determinants: f64 = inverses.iter().map(|(_, ln)| ln).sum();
-    let scaled =
-        SMatrix::<f64, M, M>::from_fn(|i, j| information[(i, j)] * prior[i].1 * prior[j].1);
-    let freedom = (3 * planes.len()) as f64 - M as f64;
-    let ln_scaled = Cholesky::new(scaled)?.ln_determinant();
-    let likelihood = -0.5 * (determinants + ln_scaled + freedom * variance.ln());
+    let root = Cholesky::new(prior.covariance)?.unpack();
+    let ln_scaled = Cholesky::new(root.transpose() * information * root)?.ln_determinant();
+    let off = theta + delta - prior.mean;
+    let likelihood = -0.5
+        * (determinants + n_numbers * variance.ln() + ln_scaled - n_found
+            + off.dot(&(prior.precision * off)));
+    let weights: Vec<Matrix3<f64>> =
+        inverses.iter().zip(&robust).map(|((inverse, _), w)| inverse * (*w / variance)).collect();
     let parts = planes
         .iter()
         .zip(gains)
-        .zip(&inverses)
         .zip(&weights)
-        .map(|(((plane, gain), (inverse, _)), w)| {
-            let weighted = gain.transpose() * inverse * *w;
-            (weighted * gain, weighted * (plane.beta - gain * delta))
+        .map(|((plane, gain), weight)| {
+            let weighted = gain.transpose() * weight;
+            Reduced {
+                information: (weighted * gain).as_slice().to_vec(),
+                score: (weighted * (plane.beta - gain * delta)).as_slice().to_vec(),
+            }
         })
         .collect();
-    let weights = inverses.into_iter().map(|(inverse, _)| inverse).zip(weights).collect();
-    Some(Weighed { delta, information, parts, variance, weights, likelihood })
-}
-
-/// The covariance by leaving each frame out in turn (jackknife): whatever a frame's residuals have in common counts.
-/// `None` where a frame alone determines a number.
-fn leave_one_out<const M: usize>(
-    information: &SMatrix<f64, M, M>,
-    parts: &[(SMatrix<f64, M, M>, SVector<f64, M>)],
-) -> Option<SMatrix<f64, M, M>> {
-    let n = parts.len() as f64;
-    let mut covariance = SMatrix::<f64, M, M>::zeros();
-    for (part, score) in parts {
-        let change = Cholesky::new(information - part)?.solve(score);
-        covariance.ger((n - 1.0) / n, &change, &change, 1.0);
-    }
-    Some(covariance)
-}
-
-/// The correlations of the model, for each number the larger of both σ.
-fn larger<const M: usize>(
-    model: SMatrix<f64, M, M>,
-    other: Option<SMatrix<f64, M, M>>,
-) -> SMatrix<f64, M, M> {
-    let Some(other) = other else { return model };
-    let factor = |i: usize| (other[(i, i)] / model[(i, i)]).sqrt().max(1.0);
-    SMatrix::from_fn(|i, j| model[(i, j)] * factor(i) * factor(j))
+    Some(Weighed { delta, information, parts, weights, likelihood })
 }
 
 /// Adds what the camera's own covariance does.
@@ -626,105 +670,66 @@ fn with_camera<const M: usize>(
     covariance
 }
 
-/// Zoom, shift (px) and the share of the other distortion state, with their covariance.
-pub(super) type LensPlace = (SVector<f64, 4>, SMatrix<f64, 4, 4>);
-
-/// By one step from where the five numbers are best.
+/// With the share of the other distortion state, by one step from where the other numbers are best.
 fn lens_by_slopes(
     planes: &[Plane],
     theta: &Numbers,
+    relief: &Relief,
     calibration: Option<&Calibration>,
-) -> Option<LensPlace> {
-    let gains: Vec<SMatrix<f64, 3, 6>> = planes
+) -> Option<Seen<{ N + 1 }>> {
+    let gains: Vec<_> = planes
         .iter()
         .map(|plane| {
-            let mut gain = SMatrix::<f64, 3, 6>::zeros();
+            let mut gain = SMatrix::<f64, 3, { N + 1 }>::zeros();
             gain.fixed_columns_mut::<N>(0).copy_from(&plane.gain);
             gain.set_column(N, &plane.by_lens);
             gain
         })
         .collect();
-    let mut all = SVector::<f64, 6>::zeros();
-    all.fixed_rows_mut::<N>(0).copy_from(theta);
-    let step = between_frames(planes, &gains, &all)?;
-    let covariance = with_camera(&step, calibration);
-    let place = (all + step.delta).fixed_rows::<4>(2).into_owned();
-    Some((place, covariance.fixed_view::<4, 4>(2, 2).into_owned()))
-}
-
-/// The share of the other state by both witnesses, as [`both`] joins them.
-fn lens_by_both((slopes, covariance): LensPlace, imprint: Option<LensPlace>) -> Estimate {
-    let alone = Estimate { value: slopes[3], sigma: covariance[(3, 3)].max(0.0).sqrt() };
-    let Some((print, seen)) = imprint else { return alone };
-    let apart = print - slopes;
-    let Some(inverse) = (seen + covariance).try_inverse() else { return alone };
-    let gain = covariance * inverse;
-    let left = covariance - gain * covariance;
-    let disagreement = apart.dot(&(inverse * apart)) / 4.0;
-    Estimate {
-        value: (slopes + gain * apart)[3],
-        sigma: (left[(3, 3)].max(0.0) * disagreement.max(1.0)).sqrt(),
-    }
+    let theta = theta.push(0.0);
+    let step = between_frames(planes, &gains, &theta, &Prior::new(relief.plane_covariance()))?;
+    let found = (theta + step.delta, with_camera(&step, calibration));
+    Some(Seen { found, by_frame: step.by_frame })
 }
 
 /// What zoom and shift are judged by.
-struct Witnesses<'a> {
-    step: &'a Step<N>,
+struct Witnesses {
+    slopes: Seen<N>,
     imprint: Option<Imprint>,
+    both: Option<Joined<N>>,
     /// Mean darkness of the board, −½ for paper, ½ for ink.
     darkness: f64,
     lens_share: Option<Estimate>,
-}
-
-/// Both witnesses of zoom and shift together, weighted by their covariances. Where they lie farther apart than these
-/// say, σ of zoom and shift grow by as much (Birge's ratio).
-fn both(theta: &Numbers, covariance: &Square, imprint: &Imprint) -> (Numbers, Square, f64) {
-    let seen = SMatrix::<f64, 3, 3>::from_fn(|i, j| imprint.covariance[i][j]);
-    let place =
-        Vector3::new(imprint.zoom.value, imprint.shift_px[0].value, imprint.shift_px[1].value);
-    let apart = place - theta.fixed_rows::<3>(2);
-    let Some(inverse) = (seen + covariance.fixed_view::<3, 3>(2, 2)).try_inverse() else {
-        return (*theta, *covariance, 0.0);
-    };
-    let gain = covariance.fixed_columns::<3>(2) * inverse;
-    let together = theta + gain * apart;
-    let mut left = covariance - gain * covariance.fixed_rows::<3>(2);
-    let disagreement = apart.dot(&(inverse * apart)) / 3.0;
-    let ratio = disagreement.max(1.0).sqrt();
-    for k in 2..N {
-        left.row_mut(k).scale_mut(ratio);
-        left.column_mut(k).scale_mut(ratio);
-    }
-    (together, left, disagreement)
 }
 
 fn assemble(
     input: &RegisterInput<'_>,
     scene: &Scene<'_>,
     frames: &[(&Stance, &Patches)],
-    theta: &Numbers,
-    (planes, witnesses): (&[Plane], Witnesses<'_>),
+    (planes, witnesses): (&[Plane], Witnesses),
 ) -> Registration {
-    let Witnesses { step, imprint, darkness, lens_share } = witnesses;
-    let covariance = with_camera(step, input.calibration);
+    let Witnesses {
+        slopes: Seen { found: (theta, covariance), .. },
+        imprint,
+        both,
+        darkness,
+        lens_share,
+    } = witnesses;
     let estimate = |theta: &Numbers, covariance: &Square, k: usize| Estimate {
         value: theta[k],
         sigma: covariance[(k, k)].max(0.0).sqrt(),
     };
     let slopes = Slopes {
-        zoom: estimate(theta, &covariance, 2),
-        shift_px: [3, 4].map(|k| estimate(theta, &covariance, k)),
+        zoom: estimate(&theta, &covariance, ZOOM),
+        shift_px: SHIFT.map(|k| estimate(&theta, &covariance, k)),
     };
-    let (theta, covariance, disagreement) = match &imprint {
-        Some(imprint) => {
-            let (mut theta, mut covariance, apart) = both(theta, &covariance, imprint);
-            // A board that is darker than grey is measured too far by its share of the contrast.
-            theta[1] -= darkness * imprint.contrast_m.value;
-            covariance[(1, 1)] += (darkness * imprint.contrast_m.sigma).powi(2);
-            (theta, covariance, Some(apart))
-        }
-        None => (*theta, covariance, None),
-    };
+    let disagreement = both.as_ref().map(|both| both.disagreement);
+    let (mut theta, mut covariance) = both.map_or((theta, covariance), |both| both.estimate);
+    if let Some(imprint) = &imprint {
+        // A board that is darker than grey is measured too far by its share of the contrast.
+        theta[BIAS] -= darkness * imprint.contrast_m.value;
+        covariance[(BIAS, BIAS)] += (darkness * imprint.contrast_m.sigma).powi(2);
+    }
     let estimate = |k: usize| estimate(&theta, &covariance, k);
     let n_patches = planes.iter().map(|p| p.n_patches).sum::<usize>();
     let mut frames_used: Vec<usize> = planes.iter().map(|p| p.frame).collect();
@@ -753,11 +758,13 @@ fn assemble(
         }
     }
     Registration {
-        scale: estimate(0),
-        bias_m: estimate(1),
-        zoom: estimate(2),
-        shift_px: [estimate(3), estimate(4)],
-        covariance: std::array::from_fn(|i| std::array::from_fn(|j| covariance[(i, j)])),
+        scale: estimate(SCALE),
+        bias_m: estimate(BIAS),
+        zoom: estimate(ZOOM),
+        shift_px: SHIFT.map(estimate),
+        covariance: std::array::from_fn(|i| {
+            std::array::from_fn(|j| covariance[(SCALE + i, SCALE + j)])
+        }),
         center_m: planes.iter().map(|p| p.board_m[0]).sum::<f64>() / n_patches as f64,
         range_m: [
             planes.iter().map(|p| p.board_m[1]).fold(f64::INFINITY, f64::min),

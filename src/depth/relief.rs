@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::{
     board::CharucoBoard,
     calibrate::{BoardSurface, SurfaceKind, alike},
-    geom::Vector3,
+    geom::{Matrix3, Vector3},
     solve::DenseCholesky,
 };
 
@@ -13,6 +13,8 @@ use crate::{
 /// 0.8 mm and 100 mm that takes a hundredth.
 const STEPS: usize = 4;
 
+/// Of how many places along each side the plane of what is not known is taken.
+const MAX_GRID: usize = 12;
 /// Heights follow from so many corners at most.
 const MAX_CORNERS: usize = 200;
 
@@ -22,7 +24,11 @@ pub(super) struct Relief {
     columns: usize,
     rows: usize,
     heights_m: Vec<f64>,
+    plane_covariance: Matrix3<f64>,
 }
+
+/// No board is known better than that at its rim, metres.
+const LEAST_SIGMA_M: f64 = 1e-6;
 
 impl Relief {
     /// A flat board, where there is no surface or it does not determine one.
@@ -33,13 +39,18 @@ impl Relief {
     pub(super) fn new(board: &CharucoBoard, surface: Option<&BoardSurface>) -> Self {
         let per_m = STEPS as f64 / board.square_m;
         let [columns, rows] = [board.squares_x, board.squares_y].map(|n| n * STEPS + 1);
-        let flat = Self { per_m, columns, rows, heights_m: Vec::new() };
-        let Some(surface) = surface else { return flat };
         let size_m = [board.squares_x, board.squares_y].map(|n| n as f64 * board.square_m);
+        let least = [1.0, 2.0 / size_m[0], 2.0 / size_m[1]].map(|by| LEAST_SIGMA_M * by);
+        let least = Matrix3::from_diagonal(&Vector3::from(least.map(|sigma| sigma * sigma)));
+        let heights_m = Vec::new();
+        let mut flat = Self { per_m, columns, rows, heights_m, plane_covariance: least };
+        let Some(surface) = surface else { return flat };
         let at = |i: usize| ((i % columns) as f64 / per_m, (i / columns) as f64 / per_m);
         let heights_m = if surface.kind == SurfaceKind::Free {
-            Expected::new(board, &surface.heights_m)
-                .map(|expected| (0..columns * rows).map(|i| expected.height_m(at(i))).collect())
+            Expected::new(board, &surface.heights_m).map(|expected| {
+                flat.plane_covariance += expected.plane_covariance(board);
+                (0..columns * rows).map(|i| expected.height_m(at(i))).collect()
+            })
         } else {
             parabolas(board, size_m, &surface.heights_m).map(|coefficients_m| {
                 let height = |(x, y): (f64, f64)| {
@@ -50,6 +61,12 @@ impl Relief {
             })
         };
         Self { heights_m: heights_m.unwrap_or_default(), ..flat }
+    }
+
+    /// How sure the plane through the whole surface is, given the heights of the corners: of the height of its middle
+    /// (m) and its slopes along rows and columns.
+    pub(super) fn plane_covariance(&self) -> Matrix3<f64> {
+        self.plane_covariance
     }
 
     /// Height of a place on the board; beyond its outline, that of the outline.
@@ -74,8 +91,13 @@ impl Relief {
 struct Expected {
     pitch_m: f64,
     places: Vec<Vector3<f64>>,
-    /// The covariance's inverse times the heights.
+    /// Of the correlation of the places' heights.
+    factor: DenseCholesky,
+    /// The correlation's inverse times the heights.
     weights: Vec<f64>,
+    /// How far the surface stands from its plane, as far as the heights themselves tell: the variance of greatest
+    /// likelihood, but for the plane's three numbers, m².
+    variance: f64,
 }
 
 impl Expected {
@@ -97,8 +119,46 @@ impl Expected {
         let covariance =
             (0..n * n).map(|at| alike((places[at / n] - places[at % n]).norm(), pitch_m)).collect();
         let heights: Vec<f64> = ids.iter().map(|&id| heights_m[id]).collect();
-        let weights = DenseCholesky::new(covariance, n)?.solve(&heights);
-        Some(Self { pitch_m, places, weights })
+        let factor = DenseCholesky::new(covariance, n)?;
+        let weights = factor.solve(&heights);
+        let squares: f64 = heights.iter().zip(&weights).map(|(h, w)| h * w).sum();
+        let variance = squares / (n.saturating_sub(3).max(1)) as f64;
+        Some(Self { pitch_m, places, factor, weights, variance })
+    }
+
+    /// Of the plane nearest to what the surface differs from what is expected of it, at an even grid over the board.
+    fn plane_covariance(&self, board: &CharucoBoard) -> Matrix3<f64> {
+        let size_m = [board.squares_x, board.squares_y].map(|n| n as f64 * board.square_m);
+        let n = [board.squares_x, board.squares_y].map(|n| n.min(MAX_GRID));
+        let along = |k: usize, i: usize| (i as f64 + 0.5) / n[k] as f64 * size_m[k];
+        let grid: Vec<Vector3<f64>> = (0..n[0] * n[1])
+            .map(|i| Vector3::new(along(0, i % n[0]), along(1, i / n[0]), 0.0))
+            .collect();
+        let middle = 0.5 * Vector3::new(size_m[0], size_m[1], 0.0);
+        let row = |at: &Vector3<f64>| Vector3::new(1.0, at.x - middle.x, at.y - middle.y);
+        let normal: Matrix3<f64> = grid.iter().map(|at| row(at) * row(at).transpose()).sum();
+        let Some(inverse) = normal.try_inverse() else { return Matrix3::zeros() };
+        // By the plane's three numbers, the correlation of each with the corners' heights and with itself.
+        let by_corner: Vec<Vector3<f64>> = self
+            .places
+            .iter()
+            .map(|place| {
+                grid.iter().map(|at| row(at) * alike((place - at).norm(), self.pitch_m)).sum()
+            })
+            .collect();
+        let solved: [Vec<f64>; 3] = std::array::from_fn(|k| {
+            self.factor.solve(&by_corner.iter().map(|by| by[k]).collect::<Vec<f64>>())
+        });
+        let mut left: Matrix3<f64> = Matrix3::zeros();
+        for at in &grid {
+            for other in &grid {
+                left += row(at) * row(other).transpose() * alike((at - other).norm(), self.pitch_m);
+            }
+        }
+        for (i, by) in by_corner.iter().enumerate() {
+            left -= by * Vector3::from_fn(|k, _| solved[k][i]).transpose();
+        }
+        inverse * (0.5 * (left + left.transpose())) * inverse * self.variance
     }
 
     fn height_m(&self, (x, y): (f64, f64)) -> f64 {
@@ -170,6 +230,32 @@ mod tests {
             assert!(inside < 2.5e-5, "{squares:?}: {inside}");
             assert!(beyond < 0.2 * flat, "{squares:?}: {beyond} of {flat}");
         }
+    }
+
+    /// The plane of what lies between and beyond corners, against what is said of it beforehand.
+    #[test]
+    fn the_plane_of_what_is_not_known_is_as_large_as_said() {
+        let board = CharucoBoard::paper(0.02).expect("a board");
+        let size_m = [board.squares_x, board.squares_y].map(|n| n as f64 * 0.02);
+        let mut mean = 0.0;
+        for k in 0..20 {
+            let (a, b) = (35.0 + 0.7 * f64::from(k), 0.9 * f64::from(k));
+            let height = |x: f64, y: f64| 4e-4 * (a * x + b).sin() * (0.8 * a * y + 1.3 * b).cos();
+            let relief = Relief::new(&board, Some(&surface(&board, SurfaceKind::Free, height)));
+            let (mut ata, mut atb) = (Matrix3::zeros(), Vector3::zeros());
+            for (i, j) in (0..40).flat_map(|i| (0..32).map(move |j| (i, j))) {
+                let (x, y) = ((f64::from(i) + 0.5) * 0.005, (f64::from(j) + 0.5) * 0.005);
+                let row = Vector3::new(1.0, x - 0.5 * size_m[0], y - 0.5 * size_m[1]);
+                ata += row * row.transpose();
+                atb += row * (height(x, y) - relief.height_m(x, y));
+            }
+            let plane = ata.try_inverse().expect("a grid") * atb;
+            let inverse = relief.plane_covariance().try_inverse().expect("positive");
+            mean += plane.dot(&(inverse * plane)) / 3.0 / 20.0;
+        }
+        assert!((0.1..4.0).contains(&mean), "{mean}");
+        let flat = Relief::new(&board, None).plane_covariance();
+        assert!(flat[(0, 0)].sqrt() <= LEAST_SIGMA_M && flat[(1, 1)].sqrt() < 2e-5, "{flat}");
     }
 
     #[test]

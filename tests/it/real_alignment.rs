@@ -44,7 +44,9 @@ fn av_foundation_is_aligned() {
         let verdict = |code: Code| {
             audit.findings.iter().find(|f| f.code == code).expect("is checked").verdict
         };
-        assert_eq!(verdict(Code::TD401), Verdict::Ok, "{name}");
+        // The 5th generation's frames are few and blurred: 0.994 ± 0.0025 leaves open whether 1 % is exceeded.
+        let known = if name.contains("5gen") { Verdict::Unknown } else { Verdict::Ok };
+        assert_eq!(verdict(Code::TD401), known, "{name}");
         assert_ne!(verdict(Code::TD403), Verdict::Fault, "{name}");
         let [x, y] = found.shift_px;
         assert!(y.value.abs() < 3.0 * y.sigma, "{name}: {y:?}");
@@ -87,6 +89,42 @@ fn moved(recording: &Recording, from: impl Fn(Pixel) -> Option<Pixel>) -> Record
         files.insert(file.clone(), encode_depth(&DepthMap::new(width, map.height(), depth_m)));
     }
     Recording::from_source(Arc::new(files), &Limits::default()).expect("opens")
+}
+
+/// Every second frame against the others: each half calibrates for itself. With ten frames to a half an honest σ²
+/// still scatters, and the mean square of errors over σ is ν/(ν−2), 1.3 for eight degrees of freedom; nine of these
+/// are below 4.1 on average in 99.9 % of cases.
+#[test]
+fn halves_agree() {
+    let mut squares = Vec::new();
+    for name in RECORDINGS {
+        let Some(path) = data(name) else { return };
+        let recording = Recording::open(&path, &Limits::default()).expect("opens");
+        let half = |odd: usize| {
+            let left_out = recording.frames.iter().enumerate().filter(|(i, _)| i % 2 != odd);
+            let left_out: Vec<&str> = left_out
+                .flat_map(|(_, f)| f.color.iter().chain(&f.depth))
+                .map(String::as_str)
+                .collect();
+            let mut files = Memory::new("half");
+            for name in recording.file_names() {
+                if !left_out.contains(&name) {
+                    files.insert(name, recording.file(name).expect("reads"));
+                }
+            }
+            run(&Recording::from_source(Arc::new(files), &Limits::default()).expect("opens"))
+        };
+        let (even, odd) = (half(0), half(1));
+        let (even, odd) = (registration(&even), registration(&odd));
+        let [[ax, ay], [bx, by]] = [even.shift_px, odd.shift_px];
+        for (a, b) in [(even.zoom, odd.zoom), (ax, bx), (ay, by)] {
+            let z = (a.value - b.value) / a.sigma.hypot(b.sigma);
+            assert!(z.abs() < 4.0, "{name}: {a:?} {b:?}");
+            squares.push(z * z);
+        }
+    }
+    let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+    assert!(mean < 4.1, "{mean}: {squares:?}");
 }
 
 /// The paper's first issue, made from a recording that does not have it.
