@@ -10,6 +10,7 @@ use crate::{
     camera::{Camera, Distortion},
     depth::{
         BoardDepth, Patches, RegisterInput, against_board, handedness, patches, register, sense,
+        temporal_noise,
     },
     detect::{Corner, Observation},
     diagnose::{Case, Device, diagnose},
@@ -166,6 +167,12 @@ pub(super) fn conclude(
     let distortion = own.distortion(ground, &board, &frames);
     let handedness = (!pairs.is_empty()).then(|| handedness(&board, own.surface(), &pairs));
     drop(pairs);
+    let temporal_noise = temporal_noise(
+        &frames
+            .iter()
+            .map(|f| Some((f.observation.corners.as_slice(), f.patches.as_ref()?)))
+            .collect::<Vec<_>>(),
+    );
     let lens_share = registration.as_ref().and_then(|r| r.lens_share);
     let (findings, distortion_state) = diagnose(&Case {
         problems: ground.problems,
@@ -182,6 +189,7 @@ pub(super) fn conclude(
         factory_depth: factory_depth.as_ref(),
         own_depth: own_depth.as_ref(),
         registration: registration.as_ref(),
+        temporal_noise: Some(&temporal_noise),
         distortion: distortion.as_ref(),
         steps: &frames.iter().filter_map(|f| f.patches.as_ref()?.steps).collect::<Vec<_>>(),
         t_ns: &frames.iter().map(|f| f.t_ns).collect::<Vec<_>>(),
@@ -205,6 +213,7 @@ pub(super) fn conclude(
         factory_depth,
         own_depth,
         registration,
+        temporal_noise,
         handedness,
         distortion,
         distortion_state,

@@ -10,7 +10,7 @@ use crate::{
     board::{CharucoBoard, Layout},
     calibrate::{Calibration, DistortionTest},
     camera::{Camera, OtherSize},
-    depth::{BoardDepth, Handedness, Patches, Registration},
+    depth::{BoardDepth, Handedness, Patches, Registration, TemporalNoise},
     detect::{Detector, Observation},
     diagnose::{Device, DistortionState, Finding, Verdict},
     image::Rgb,
@@ -51,6 +51,8 @@ pub struct Audit {
     /// Depth against colour and truth, from the board's whole surface with the own camera; `None` without one, and
     /// where too few frames have depth on the board.
     pub registration: Option<Registration>,
+    /// What comes and goes between successive depth maps in which nothing moved.
+    pub temporal_noise: TemporalNoise,
     /// Whether the depth maps are mirrored against the colour images; `None` where no pose of the board is known.
     pub handedness: Option<Handedness>,
     /// How much of the lens' distortion is left in the stream, from the pixels; `None` where the views do not tell.

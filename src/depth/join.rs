@@ -73,8 +73,9 @@ mod tests {
 
     /// Three numbers of which somebody else knows the last two, ten frames each.
     fn joined(apart: f64, common: f64) -> Joined<3> {
-        let own =
-            |frame: usize| Vector3::new(0.1, 0.1, 0.1) * if frame % 2 == 0 { 1.0 } else { -1.0 };
+        let own = |frame: usize| {
+            Vector3::new(0.1, 0.1, 0.1) * if frame.is_multiple_of(2) { 1.0 } else { -1.0 }
+        };
         let ours = Seen {
             found: (Vector3::new(1.0, 0.0, 0.0), Matrix3::identity()),
             by_frame: (0..10).map(|frame| (3 * frame, own(frame))).collect(),

@@ -7,7 +7,8 @@
 //!
 //! [`patches`] keeps the board's whole surface of a depth map, and [`register`] takes those of all views to a
 //! [`Registration`]: scale and bias of the sensor, zoom and shift of the depth map against the colour image, with their
-//! covariance and the [`Pattern`] that is left. [`handedness`] tells a mirrored depth map.
+//! covariance and the [`Pattern`] that is left. [`handedness`] tells a mirrored depth map, [`temporal_noise`] what
+//! comes and goes between frames in which nothing moved.
 //!
 //! The sign is the paper's (arXiv:2201.10865, section 4.2): **error = board depth − sensor depth**, along the optical
 //! axis. Apple's depth maps are aligned with the colour image as it is, distorted or not, so the map is read at the
@@ -46,6 +47,7 @@ mod rays;
 mod register;
 mod relief;
 mod stance;
+mod temporal;
 
 pub(crate) use against_board::corner_on;
 pub use against_board::{BoardDepth, FrameDepth, MAX_ERROR_M, Sample, against_board, sense};
@@ -54,3 +56,4 @@ pub use imprint::{Imprint, Texture};
 pub use patch::{DepthSteps, Patch, Patches, patches};
 pub use pattern::{Holes, MAX_INCIDENCE_DEG, NEAR_M, Pattern, PatternCell};
 pub use register::{OtherState, RegisterInput, Registration, Slopes, register};
+pub use temporal::{Lattice, NoiseAtRange, STILL_PX, TemporalNoise, temporal_noise};

@@ -2,7 +2,7 @@
 
 use fearless_simd::{Level, Simd, dispatch, f64x8, prelude::*};
 
-use super::{CornerDepth, Texture};
+use super::{CornerDepth, Lattice, Texture};
 use crate::{
     board::CharucoBoard,
     detect::Corner,
@@ -64,6 +64,8 @@ pub struct Patches {
     pub corners: Vec<CornerDepth>,
     /// What is rough: the print, faintly.
     pub texture: Texture,
+    /// Single pixels, to compare with those of the next frame.
+    pub lattice: Lattice,
 }
 
 /// So many patches would fill the outline: enough to see the sensor's patterns, few enough to keep for every frame.
@@ -108,14 +110,12 @@ pub fn patches(map: &DepthMap, board: &CharucoBoard, corners: &[Corner]) -> Opti
     let (top, height) = bound(&|p| p.y, map.height());
     let area = (width.saturating_sub(left) * height.saturating_sub(top)) as f64;
     let side_px = ((area / PATCHES).sqrt().round() as usize).max(4);
-    let inside = |x: usize, y: usize| {
+    let within = |x: usize, y: usize, rim: f64| {
         cell_from_pixel.map(Pixel::new(x as f64, y as f64)).is_some_and(|cell| {
-            cell.x >= -RIM_SQUARES
-                && cell.y >= -RIM_SQUARES
-                && cell.x <= right + RIM_SQUARES
-                && cell.y <= bottom + RIM_SQUARES
+            cell.x >= -rim && cell.y >= -rim && cell.x <= right + rim && cell.y <= bottom + rim
         })
     };
+    let inside = |x: usize, y: usize| within(x, y, RIM_SQUARES);
     let read = |corner: &Corner| {
         let mirrored = Pixel::new(map.width() as f64 - 1.0 - corner.pixel.x, corner.pixel.y);
         CornerDepth {
@@ -131,6 +131,7 @@ pub fn patches(map: &DepthMap, board: &CharucoBoard, corners: &[Corner]) -> Opti
         steps: None,
         corners: corners.iter().map(read).collect(),
         texture: Texture::new(map, [left, top], [width, height]),
+        lattice: Lattice::new(map, [left, top], [width, height], |x, y| within(x, y, 0.0)),
     };
     let mut levels_m = Vec::new();
     let mut samples = Samples::new(side_px);

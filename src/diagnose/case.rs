@@ -12,7 +12,7 @@ use crate::{
     board::CharucoBoard,
     calibrate::{Calibration, DistortionTest},
     camera::Camera,
-    depth::{BoardDepth, DepthSteps, Handedness, Registration},
+    depth::{BoardDepth, DepthSteps, Handedness, Registration, TemporalNoise},
     detect::Observation,
     pose::View,
     recording::{Factory, Problem},
@@ -49,6 +49,8 @@ pub struct Case<'a> {
     pub own_depth: Option<&'a BoardDepth>,
     /// Depth against colour and truth with the own camera.
     pub registration: Option<&'a Registration>,
+    /// What comes and goes between successive depth maps in which nothing moved; `None` where no depth was looked at.
+    pub temporal_noise: Option<&'a TemporalNoise>,
     /// How much of the lens' distortion is left in the stream.
     pub distortion: Option<&'a DistortionTest>,
     /// In what steps depth is stored, for each frame with depth on the board.
@@ -83,6 +85,7 @@ impl<'a> Case<'a> {
             factory_depth: None,
             own_depth: None,
             registration: None,
+            temporal_noise: None,
             distortion: None,
             steps: &[],
             t_ns: &[],

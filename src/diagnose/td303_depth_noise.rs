@@ -1,6 +1,7 @@
 #![doc = include_str!("td303_depth_noise.md")]
 
 use super::{Case, Code, Evidence, Finding, Unit, Verdict};
+use crate::depth::{STILL_PX, TemporalNoise};
 
 /// Share of holes within the sensor's reach beyond which a recording is short of depth, percent.
 const MANY_HOLES_PERCENT: f64 = 10.0;
@@ -15,8 +16,11 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
     finding.tolerance = Some(MANY_HOLES_PERCENT);
     let record = "Record the board at 0.2 m to 0.4 m, not too slantingly, without direct sunlight.";
     let Some(found) = case.registration else {
-        finding.summary = "Cannot tell how noisy depth is: no own camera, or too few frames with depth on the board."
-            .to_owned();
+        finding.summary = format!(
+            "Cannot tell how noisy depth is: no own camera, or too few frames with depth on the board. {}",
+            between_frames(case.temporal_noise),
+        );
+        finding.evidence = evidence_between_frames(case.temporal_noise);
         record.clone_into(&mut finding.what_to_do);
         return finding;
     };
@@ -36,6 +40,7 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
         Evidence::number("n_pixels_in_reach", holes.n_pixels_in_reach as f64),
         Evidence::number("n_holes_in_reach", holes.n_holes_in_reach as f64),
     ];
+    finding.evidence.extend(evidence_between_frames(case.temporal_noise));
     let numbers = format!(
         "single pixels scatter by {:.2} mm about small planes ({times:.1} times what a sound sensor does at {:.2} m), \
          places of the image by {:.2} mm from frame to frame, and {:.2} mm stay in all frames",
@@ -51,12 +56,13 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
         |share| format!("{:.2} % of the pixels on the board within reach are holes", 100.0 * share),
     );
     finding.summary = format!(
-        "{}: {numbers}; {gaps}.",
+        "{}: {numbers}; {gaps}. {}",
         match (noisy, torn) {
             (true, _) => "Depth is noisier than a sound sensor's",
             (false, true) => "Depth has many holes",
             (false, false) => "Depth is as noisy as a sound sensor's",
-        }
+        },
+        between_frames(case.temporal_noise),
     );
     (finding.verdict, finding.what_to_do) = match (noisy || torn, share) {
         (true, _) => {
@@ -66,4 +72,43 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
         (false, Some(_)) => (Verdict::Ok, String::new()),
     };
     finding
+}
+
+/// What single pixels do between frames in which nothing moved, in a sentence.
+fn between_frames(found: Option<&TemporalNoise>) -> String {
+    let n_successive = found.map_or(0, |found| found.n_successive);
+    let Some(at) = found.and_then(TemporalNoise::most_seen) else {
+        let why = if n_successive == 0 {
+            "no two successive frames show the board with depth".to_owned()
+        } else {
+            format!(
+                "in none of {n_successive} pairs of successive frames did the board stand still (to {STILL_PX} px)"
+            )
+        };
+        return format!(
+            "What comes and goes at a pixel from frame to frame cannot be told: {why}."
+        );
+    };
+    format!(
+        "Where nothing moved between successive frames (pairs: {}), a pixel comes and goes by {:.3} ± {:.3} mm at \
+         {:.2} m, of {:.2} mm within one frame: the rest is pattern and print, which averaging frames leaves.",
+        at.n_pairs,
+        1e3 * at.noise_m.value,
+        1e3 * at.noise_m.sigma,
+        at.depth_m,
+        1e3 * at.one_frame_m,
+    )
+}
+
+fn evidence_between_frames(found: Option<&TemporalNoise>) -> Vec<Evidence> {
+    let Some(found) = found else { return Vec::new() };
+    let mut evidence = vec![
+        Evidence::number("n_successive_pairs", found.n_successive as f64),
+        Evidence::number("n_still_pairs", found.n_still as f64),
+    ];
+    if let Some(at) = found.most_seen() {
+        evidence.push(Evidence::number("temporal_noise_mm", 1e3 * at.noise_m.value));
+        evidence.push(Evidence::number("temporal_noise_sigma_mm", 1e3 * at.noise_m.sigma));
+    }
+    evidence
 }

@@ -11,8 +11,8 @@ use crate::{
     calibrate::{FrameCorners, Input, Method, Model, calibrate, distortion_test},
     camera::{Camera, Distortion, Intrinsics, RadialTable, TablePair},
     depth::{
-        BoardDepth, CornerDepth, DepthSteps, Patch, Patches, RegisterInput, Texture, against_board,
-        handedness, register,
+        BoardDepth, CornerDepth, DepthSteps, Lattice, Patch, Patches, RegisterInput, Texture,
+        against_board, handedness, register,
     },
     detect::{Corner, Identity, Observation},
     geom::{Board, Color, Pixel, Pose, Rotation, Vector3},
@@ -140,6 +140,7 @@ impl World {
             steps: Some(self.steps),
             corners,
             texture: Texture::nothing(),
+            lattice: Lattice::default(),
         }
     }
 
@@ -241,6 +242,7 @@ impl World {
             factory_depth: Some(&factory_depth),
             own_depth: own_depth.as_ref(),
             registration: registration.as_ref(),
+            temporal_noise: None,
             distortion: distortion.as_ref(),
             steps: &[self.steps],
             t_ns: &(0..20).map(|i| 500_000_000 * i).collect::<Vec<_>>(),

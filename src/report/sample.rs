@@ -12,7 +12,10 @@ use crate::{
         Hypothesis, Lens, Model, Outlier, Parameter, RejectedFrame, Rejection, SurfaceKind,
     },
     camera::{Camera, Distortion, Intrinsics},
-    depth::{Holes, Pattern, PatternCell, Registration, Slopes, against_board, patches},
+    depth::{
+        Holes, NoiseAtRange, Pattern, PatternCell, Registration, Slopes, TemporalNoise,
+        against_board, patches,
+    },
     detect::{Corner, Identity, Observation, Reason, Reject},
     diagnose::{
         Code, Correction, Device, DistortionState, Evidence, Finding, Sensor, Unit, Verdict,
@@ -59,6 +62,7 @@ pub(super) fn audit() -> Audit {
         factory_depth: Some(depth(|f| f.factory_view.as_ref())),
         own_depth: Some(depth(|f| f.own_view.as_ref())),
         registration: None,
+        temporal_noise: TemporalNoise::default(),
         handedness: None,
         distortion: calibration.distortion.clone(),
         calibration: Some(calibration),
@@ -116,6 +120,17 @@ pub(super) fn rich_audit() -> Audit {
         frame_noise_m: 2e-4,
         fixed_m: 3e-4,
         holes: Holes::default(),
+    };
+    audit.temporal_noise = TemporalNoise {
+        by_range: vec![NoiseAtRange {
+            depth_m: 0.2,
+            noise_m: estimate(9e-5, 3e-6),
+            one_frame_m: 2.6e-4,
+            n_pairs: 4,
+            n_pixels: 6000,
+        }],
+        n_successive: 4,
+        n_still: 4,
     };
     audit.registration = Some(Registration {
         scale: estimate(1.003, 0.009),

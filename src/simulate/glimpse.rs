@@ -34,9 +34,19 @@ impl Plan {
     /// is not in it are the detector's own slips (wrong places of corners that are half hidden, blur that σ does not
     /// tell).
     pub fn glimpse(&self, frame: usize) -> Glimpse {
+        self.glimpse_of(frame, frame)
+    }
+
+    /// Frame `frame` twice, as if board and camera had stood still: with noise of its own each.
+    pub fn glimpses_of_one_pose(&self, frame: usize) -> [Glimpse; 2] {
+        [frame, self.n_frames + frame].map(|noise| self.glimpse_of(frame, noise))
+    }
+
+    /// The scene of one frame with the noise of another.
+    fn glimpse_of(&self, frame: usize, noise: usize) -> Glimpse {
         let scene = self.scene(frame);
         let sigma_px = SHARP_PX.hypot(PER_MOTION * motion_px(&scene));
-        let mut random = Random::new(self.seed, Subject::Corners, frame);
+        let mut random = Random::new(self.seed, Subject::Corners, noise);
         let [width, height] =
             [scene.camera.intrinsics.width, scene.camera.intrinsics.height].map(|n| n as f64);
         let corners: Vec<Corner> = self
@@ -60,7 +70,7 @@ impl Plan {
             margin: 100.0,
         });
         let depth =
-            self.as_recorded(measure_frame(&scene, &self.sensor_with_faults(), self.seed, frame));
+            self.as_recorded(measure_frame(&scene, &self.sensor_with_faults(), self.seed, noise));
         Glimpse { observation: Observation { corners, identity, rejects: Vec::new() }, depth }
     }
 }

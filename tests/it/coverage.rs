@@ -3,6 +3,7 @@
 use truedepth::{
     audit::{Audit, Method, Options, Seen, audit_seen},
     calibrate::{Estimate, MAX_VIEWS},
+    depth::{patches, temporal_noise},
     diagnose::{Code, Verdict},
     simulate::{Device, Faults, Plan, Stream},
 };
@@ -98,4 +99,28 @@ fn faults_of_depth_are_told_apart() {
     }
     let (_, audit) = judged("ipad-12.9-5gen", 4, &["depth-mirrored"]);
     assert!(faults(&audit).contains(&Code::TD403), "{:?}", audit.handedness);
+}
+
+/// Depth maps of one and the same pose, each with noise of its own, quantised. Noise that reaches over 14 px is alike
+/// in two of the pixels compared, so that fewer are independent than are counted.
+#[test]
+fn noise_between_frames_is_the_simulated_sensors() {
+    let mut squares = Vec::new();
+    for seed in 0..4 {
+        let plan = Plan::new(Device::named("ipad-12.9-5gen").expect("is known"), seed);
+        let [first, second] = plan.glimpses_of_one_pose(3);
+        let corners = first.observation.corners.as_slice();
+        let [before, after] = [&first, &second]
+            .map(|glimpse| patches(&glimpse.depth, &plan.board, corners).expect("a board"));
+        let found = temporal_noise(&[Some((corners, &before)), Some((corners, &after))]);
+        assert_eq!((found.n_successive, found.n_still), (1, 1));
+        let truth = plan.truth().depth;
+        for at in found.by_range {
+            let noise_m = truth.noise_floor_m.hypot(at.depth_m.powi(2) * truth.noise_per_m);
+            let expected_m = noise_m.hypot(truth.unit_m / 12_f64.sqrt());
+            squares.push(((at.noise_m.value - expected_m) / at.noise_m.sigma).powi(2));
+        }
+    }
+    let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+    assert!(squares.len() >= 4 && mean < 4.0, "{squares:?}");
 }

@@ -114,6 +114,28 @@ fn iphone_has_no_focal_fault() {
     }
 }
 
+/// Five frames each of a board that stands still: a pixel hardly changes from frame to frame. Of the 0.2 mm and more by
+/// which it stands off the plane of its neighbours nearly all is there in every frame.
+#[test]
+fn noise_between_frames() {
+    for name in [IPHONE_DEPTH, IPAD5_DEPTH] {
+        let Some(audit) = run(name, Method::Auto) else { return };
+        let found = &audit.temporal_noise;
+        assert!(found.n_successive == 4 && found.n_still >= 2, "{name}: {found:?}");
+        let at = found.most_seen().expect("stood still");
+        assert!((0.18..0.21).contains(&at.depth_m), "{name}: {at:?}");
+        assert!((5e-5..1.5e-4).contains(&at.noise_m.value), "{name}: {at:?}");
+        assert!(at.noise_m.value + 3.0 * at.noise_m.sigma < at.one_frame_m, "{name}: {at:?}");
+        let noise = finding(&audit, Code::TD303);
+        assert!(noise.summary.contains("a pixel comes and goes by"), "{noise:?}");
+    }
+    // Held by hand, a frame every second: nothing to compare.
+    let Some(audit) = run(IPAD4, Method::Auto) else { return };
+    assert_eq!(audit.temporal_noise.by_range, []);
+    let noise = finding(&audit, Code::TD303);
+    assert!(noise.summary.contains("cannot be told"), "{noise:?}");
+}
+
 /// Same input, same findings, whatever the threads did.
 #[test]
 fn twice_the_same() {

@@ -9,7 +9,7 @@ use crate::{
     audit::{self, FrameAudit},
     board::{CharucoBoard, Layout},
     calibrate::Estimate,
-    depth::{BoardDepth, FrameDepth, Pattern},
+    depth::{BoardDepth, FrameDepth, NoiseAtRange, Pattern},
     diagnose::{self, Device, Finding},
     recording::Factory,
 };
@@ -128,10 +128,47 @@ pub struct Depth {
     pub range_mm: Option<[f64; 2]>,
     /// What is left when scale, bias and alignment are taken out.
     pub noise: Option<DepthNoise>,
+    /// What comes and goes at a pixel between successive frames in which nothing moved, by distance; empty where there
+    /// are no such frames.
+    #[serde(default)]
+    pub temporal_noise: Vec<TemporalNoiseInfo>,
+    /// Pairs of successive frames with depth and board in both, and those in which the board stood still.
+    #[serde(default)]
+    pub successive_pairs: [usize; 2],
     /// Where in the image it is left.
     pub residual_map: Option<ResidualMap>,
     /// Frames with depth and board.
     pub per_frame: Vec<FrameDepthInfo>,
+}
+
+/// Noise of single pixels between frames, at some distance.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TemporalNoiseInfo {
+    /// Median distance of the pixels.
+    pub distance_mm: Option<f64>,
+    /// Standard deviation of a pixel between frames.
+    pub noise_mm: Option<f64>,
+    /// How sure that is.
+    pub noise_sigma_mm: Option<f64>,
+    /// Standard deviation of a pixel about small planes within one of these frames.
+    pub one_frame_mm: Option<f64>,
+    /// Pairs of frames.
+    pub n_pairs: usize,
+    /// Pixels compared, over all pairs.
+    pub n_pixels: usize,
+}
+
+impl From<&NoiseAtRange> for TemporalNoiseInfo {
+    fn from(at: &NoiseAtRange) -> Self {
+        Self {
+            distance_mm: finite(1e3 * at.depth_m),
+            noise_mm: finite(1e3 * at.noise_m.value),
+            noise_sigma_mm: finite(1e3 * at.noise_m.sigma),
+            one_frame_mm: finite(1e3 * at.one_frame_m),
+            n_pairs: at.n_pairs,
+            n_pixels: at.n_pixels,
+        }
+    }
 }
 
 /// Noise and holes of the depth maps on the board.
@@ -440,6 +477,8 @@ impl Depth {
             scale_bias_correlation: found.and_then(|r| finite(r.scale_bias_correlation())),
             range_mm: found.map(|r| r.range_m.map(|depth_m| 1e3 * depth_m)),
             noise: found.map(|r| DepthNoise::from(&r.pattern)),
+            temporal_noise: audit.temporal_noise.by_range.iter().map(Into::into).collect(),
+            successive_pairs: [audit.temporal_noise.n_successive, audit.temporal_noise.n_still],
             residual_map: found.map(|r| ResidualMap::from(&r.pattern)),
             per_frame: frames.iter().map(|frame| FrameDepthInfo::new(frame, own)).collect(),
         })

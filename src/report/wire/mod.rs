@@ -24,7 +24,8 @@ mod reproduce;
 
 pub use audit::{
     Alignment, Audit, Board, CorrectionInfo, Depth, DepthNoise, DeviceInfo, EvidenceInfo,
-    FactoryInfo, FindingInfo, Frame, FrameDepthInfo, PrintWitness, ResidualMap, Witness,
+    FactoryInfo, FindingInfo, Frame, FrameDepthInfo, PrintWitness, ResidualMap, TemporalNoiseInfo,
+    Witness,
 };
 pub use calibration::{
     BoardSurface, Calibration, Candidate, Distortion, DistortionTest, Hypothesis, LeftOut, Outlier,
