@@ -1,7 +1,10 @@
 #![doc = include_str!("td202_principal_point.md")]
 
 use super::{Case, Code, Correction, DistortionState, Evidence, Finding, Unit, Verdict};
-use crate::calibrate::{Estimate, Lens};
+use crate::{
+    calibrate::{Estimate, Lens},
+    camera::Intrinsics,
+};
 
 /// The principal point, free, under what is in the stream.
 fn measured(case: &Case<'_>, state: DistortionState) -> Option<[Estimate; 2]> {
@@ -15,18 +18,33 @@ fn measured(case: &Case<'_>, state: DistortionState) -> Option<[Estimate; 2]> {
     case.distortion?.hypotheses.iter().find(|h| h.lens == lens).map(|h| h.center_px)
 }
 
+/// The factory's principal point where it lies in these images, and whether that is where a mirror puts it: where the
+/// markers read mirrored, either the images are (and the point with them) or the print is; the measured point tells.
+fn expected(case: &Case<'_>, own: [Estimate; 2]) -> Option<([f64; 2], bool)> {
+    let Intrinsics { cx, cy, width, .. } = case.factory?.intrinsics;
+    let mirrored_x = width as f64 - 1.0 - cx;
+    let n = case.observations.iter().filter_map(|o| o.identity.as_ref());
+    let (n, mirrored) = n.fold((0, 0), |(n, m), i| (n + 1, m + usize::from(i.mirrored)));
+    let off = |x: f64| (own[0].value - x).abs();
+    if 2 * mirrored > n && off(mirrored_x) < off(cx) {
+        Some(([mirrored_x, cy], true))
+    } else {
+        Some(([cx, cy], false))
+    }
+}
+
 pub(super) fn check(case: &Case<'_>, state: DistortionState) -> Finding {
     let mut finding = Finding::new(Code::TD202, Unit::Px);
     let tolerance_px = case.tolerances.principal_point_px;
     finding.tolerance = Some(tolerance_px);
     let record = "Record 20 or more frames with the board tilted by 20 to 45 degrees to all sides and turned in the \
                   image by 90 degrees in some of them.";
-    let factory = case.factory.map(|f| [f.intrinsics.cx, f.intrinsics.cy]);
     let measured = measured(case, state).filter(|_| case.poor_fit().is_none());
-    let (Some(own), Some(factory)) = (measured, factory) else {
+    let expected = measured.and_then(|own| expected(case, own));
+    let (Some(own), Some((factory, is_mirrored))) = (measured, expected) else {
         let why = match case.poor_fit() {
             Some(why) => why,
-            None if factory.is_none() => "the recording has no factory intrinsics".to_owned(),
+            None if case.factory.is_none() => "the recording has no factory intrinsics".to_owned(),
             None if case.camera.is_some() => "the distortion of the stream is not known".to_owned(),
             None => case.why_no_camera(),
         };
@@ -64,6 +82,9 @@ pub(super) fn check(case: &Case<'_>, state: DistortionState) -> Finding {
          tolerance {tolerance_px:.1} px).",
         own[0].value, own[0].sigma, own[1].value, own[1].sigma, factory[0], factory[1],
     );
+    if is_mirrored {
+        finding.summary += " The images are mirrored, and so the factory's is taken mirrored, too.";
+    }
     match finding.verdict {
         Verdict::Fault => {
             finding.what_to_do =

@@ -464,6 +464,25 @@ fn a_wrong_principal_point() {
     assert!((x - 318.9).abs() < 1.0 && (y - 239.8).abs() < 1.0, "{finding:?}");
 }
 
+/// Mirrored images have their principal point mirrored: one fault (TD403), not two.
+#[test]
+fn the_principal_point_of_mirrored_images() {
+    let mut world = World::true_one();
+    world.truth.intrinsics.cx = 313.0;
+    world.own = Some(world.truth.clone());
+    world.factory.intrinsics.cx = 639.0 - 313.0;
+    assert_eq!(world.finding(Code::TD202).verdict, Verdict::Fault);
+    world.mirrored = true;
+    let finding = world.finding(Code::TD202);
+    assert!(matches!(finding.verdict, Verdict::Ok | Verdict::Info), "{finding:?}");
+    assert!(finding.summary.contains("taken mirrored"), "{finding:?}");
+    // A mirrored print: the images, and their principal point, are as they should be.
+    world.factory.intrinsics.cx = 313.0;
+    let finding = world.finding(Code::TD202);
+    assert!(matches!(finding.verdict, Verdict::Ok | Verdict::Info), "{finding:?}");
+    assert!(!finding.summary.contains("taken mirrored"), "{finding:?}");
+}
+
 /// What the metadata of two recordings say, without a registry.
 #[test]
 fn two_recordings() {
