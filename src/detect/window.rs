@@ -311,7 +311,8 @@ impl Window {
         cross: &Cross,
         q: [f64; 2],
     ) -> Option<(Slope, [f64; 2])> {
-        // The triangle of Σ w g gᵀ, Σ w g (gᵀr), and Σ g (gᵀr)·(∇w)ᵀ with the slope of the weight along the board's axes.
+        // The triangle of Σ w g gᵀ, Σ w g (gᵀr), and Σ g (gᵀr)·(∇w)ᵀ with the slope of the weight along the board's
+        // axes.
         let bumps = Bumps::new(simd, cross);
         let mut sums = [bumps.zero; 9];
         self.each(
