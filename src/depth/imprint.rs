@@ -8,7 +8,7 @@ use super::{join::Seen, rays::RayGrid};
 
 use crate::{
     board::{CharucoBoard, Layout},
-    calibrate::Estimate,
+    calibrate::{Estimate, abreast},
     geom::Pixel,
     image::DepthMap,
     solve::mad_sigma,
@@ -497,19 +497,12 @@ impl Looks<'_> {
     fn converge<const M: usize>(&self, start: Place) -> Option<(Place, Vec<Normal>)> {
         let mut place = start;
         let mut normals: Vec<Normal> = Vec::new();
+        let frames: Vec<usize> = (0..self.textures.len()).collect();
         for _ in 0..MAX_STEPS {
-            let one = |i: usize| {
+            let each = abreast(&frames, |&i| {
                 let spot = |pixel| (self.spot)(i, &place, pixel);
                 Normal::new(self.print, (i, self.textures[i]), &place, spot, self.lens)
-            };
-            // Collected in order of frames, whatever the threads did.
-            #[cfg(feature = "parallel")]
-            let each: Vec<Option<Normal>> = {
-                use rayon::prelude::{IntoParallelIterator, ParallelIterator};
-                (0..self.textures.len()).into_par_iter().map(one).collect()
-            };
-            #[cfg(not(feature = "parallel"))]
-            let each: Vec<Option<Normal>> = (0..self.textures.len()).map(one).collect();
+            });
             normals = each.into_iter().flatten().collect();
             let (information, score) = total(&normals);
             let solved = solve::<M>(&information, &score)?;

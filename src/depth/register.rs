@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     board::CharucoBoard,
-    calibrate::{Calibration, Estimate},
+    calibrate::{Calibration, Estimate, abreast},
     camera::Camera,
     geom::Pixel,
     pose::View,
@@ -191,26 +191,28 @@ pub fn register(input: &RegisterInput<'_>) -> Option<Registration> {
         .collect();
 
     let prior = Prior::new(scene.relief.plane_covariance());
-    let mut theta = prior.mean;
-    let mut found = None;
-    for _ in 0..12 {
-        let planes: Vec<Plane> = frames
-            .iter()
-            .filter_map(|(stance, patches)| scene.plane(stance, patches, &theta))
-            .collect();
-        if planes.len() < LEAST_FRAMES {
-            return None;
-        }
+    let planes_at = |theta: &Numbers, with_camera: bool| -> Option<Vec<Plane>> {
+        let planes =
+            abreast(&frames, |(stance, patches)| scene.plane(stance, patches, theta, with_camera));
+        let planes: Vec<Plane> = planes.into_iter().flatten().collect();
+        (planes.len() >= LEAST_FRAMES).then_some(planes)
+    };
+    let step_at = |planes: &[Plane], theta: &Numbers| {
         let gains: Vec<_> = planes.iter().map(|plane| plane.gain).collect();
-        let step = between_frames(&planes, &gains, &theta, &prior)?;
-        let size = step.delta.component_div(&prior.sigma()).amax();
+        between_frames(planes, &gains, theta, &prior)
+    };
+    let mut theta = prior.mean;
+    for _ in 0..12 {
+        let step = step_at(&planes_at(&theta, false)?, &theta)?;
         theta += step.delta;
-        found = Some((planes, step));
-        if size < 1e-7 {
+        if step.delta.component_div(&prior.sigma()).amax() < 1e-7 {
             break;
         }
     }
-    let (planes, step) = found?;
+    // What the camera's numbers do costs more than all else, and only counts where the others are best.
+    let planes = planes_at(&theta, true)?;
+    let step = step_at(&planes, &theta)?;
+    theta += step.delta;
     let textures: Vec<&Texture> = frames.iter().map(|(_, patches)| &patches.texture).collect();
     let look = |frame: usize, place: &Place, at| {
         let mut pixel = place.looked_at(at);
@@ -427,7 +429,13 @@ impl Scene<'_> {
     }
 
     /// The first level: one frame's plane, robustly.
-    fn plane(&self, stance: &Stance, patches: &Patches, theta: &Numbers) -> Option<Plane> {
+    fn plane(
+        &self,
+        stance: &Stance,
+        patches: &Patches,
+        theta: &Numbers,
+        with_camera: bool,
+    ) -> Option<Plane> {
         let sights = self.sights(stance, patches, theta);
         let n = sights.len();
         if n < LEAST_PATCHES {
@@ -464,13 +472,15 @@ impl Scene<'_> {
         }
         let mut gain = SMatrix::<f64, 3, N>::zeros();
         let mut by_lens = Vector3::zeros();
-        let mut by_camera = vec![Vector3::zeros(); self.moved.len()];
+        let mut by_camera = vec![Vector3::zeros(); if with_camera { self.moved.len() } else { 0 }];
         for (((patch, s), p), w) in sights.iter().zip(&precision).zip(&robust) {
             let projected = inverse * s.by_plane * (p * w);
             gain.ger(1.0, &projected, &s.by_theta, 1.0);
             by_lens += projected * s.by_lens;
-            for (sum, d) in by_camera.iter_mut().zip(self.by_camera(stance, patch.at, theta)) {
-                *sum += projected * d;
+            if with_camera {
+                for (sum, d) in by_camera.iter_mut().zip(self.by_camera(stance, patch.at, theta)) {
+                    *sum += projected * d;
+                }
             }
         }
         for (sum, m) in by_camera.iter_mut().zip(&stance.by_camera) {
@@ -586,11 +596,21 @@ fn weigh<const M: usize>(
     (theta, prior): (&SVector<f64, M>, &Prior<M>),
     ratio: f64,
 ) -> Option<Weighed<M>> {
-    let inverses: Vec<(Matrix3<f64>, f64)> = planes
+    struct Said<const M: usize> {
+        inverse: Matrix3<f64>,
+        information: SMatrix<f64, M, M>,
+        score: SVector<f64, M>,
+    }
+    let mut determinants = 0.0;
+    let said: Vec<Said<M>> = planes
         .iter()
-        .map(|plane| {
+        .zip(gains)
+        .map(|(plane, gain)| {
             let covariance = plane.pose + plane.sensor * ratio;
-            Some((covariance.try_inverse()?, covariance.determinant().ln()))
+            let inverse = covariance.try_inverse()?;
+            determinants += covariance.determinant().ln();
+            let weighted = gain.transpose() * inverse;
+            Some(Said { inverse, information: weighted * gain, score: weighted * plane.beta })
         })
         .collect::<Option<_>>()?;
     let n_numbers = (3 * planes.len()) as f64;
@@ -601,22 +621,19 @@ fn weigh<const M: usize>(
     for _ in 0..15 {
         information = prior.precision;
         let mut score = prior.precision * (prior.mean - theta);
-        for (((plane, gain), (inverse, _)), w) in
-            planes.iter().zip(gains).zip(&inverses).zip(&robust)
-        {
-            let weighted = gain.transpose() * inverse * (*w / variance);
-            information += weighted * gain;
-            score += weighted * plane.beta;
+        for (said, w) in said.iter().zip(&robust) {
+            information += said.information * (w / variance);
+            score += said.score * (w / variance);
         }
         let factor = Cholesky::new(information)?;
         delta = factor.solve(&score);
         let squares: Vec<f64> = planes
             .iter()
             .zip(gains)
-            .zip(&inverses)
-            .map(|((plane, gain), (inverse, _))| {
+            .zip(&said)
+            .map(|((plane, gain), said)| {
                 let e = plane.beta - gain * delta;
-                e.dot(&(inverse * e))
+                e.dot(&(said.inverse * e))
             })
             .collect();
         // What was known beforehand costs no freedom.
@@ -628,25 +645,18 @@ fn weigh<const M: usize>(
         }
     }
     let n_found = M as f64 - Cholesky::new(information)?.solve(&prior.precision).trace();
-    let determinants: f64 = inverses.iter().map(|(_, ln)| ln).sum();
     let root = Cholesky::new(prior.covariance)?.unpack();
     let ln_scaled = Cholesky::new(root.transpose() * information * root)?.ln_determinant();
     let off = theta + delta - prior.mean;
     let likelihood = -0.5
         * (determinants + n_numbers * variance.ln() + ln_scaled - n_found
             + off.dot(&(prior.precision * off)));
-    let weights: Vec<Matrix3<f64>> =
-        inverses.iter().zip(&robust).map(|((inverse, _), w)| inverse * (*w / variance)).collect();
-    let parts = planes
-        .iter()
-        .zip(gains)
-        .zip(&weights)
-        .map(|((plane, gain), weight)| {
-            let weighted = gain.transpose() * weight;
-            Reduced {
-                information: (weighted * gain).as_slice().to_vec(),
-                score: (weighted * (plane.beta - gain * delta)).as_slice().to_vec(),
-            }
+    let shares = said.iter().zip(&robust).map(|(said, w)| (said, w / variance));
+    let weights = shares.clone().map(|(said, share)| said.inverse * share).collect();
+    let parts = shares
+        .map(|(said, share)| Reduced {
+            information: (said.information * share).as_slice().to_vec(),
+            score: ((said.score - said.information * delta) * share).as_slice().to_vec(),
         })
         .collect();
     Some(Weighed { delta, information, parts, weights, likelihood })
