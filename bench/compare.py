@@ -4,7 +4,7 @@
     python3 bench/compare.py [--runs N] [--data DIR] [--old PYTHON] [--new PYTHON]
 
 1. The paper's whole job on the 50-frame iPhone recording: decode, detect, calibrate, compare depth with the board.
-   `truedepth audit` (which also writes its report) against `opencv_paper.py` with OpenCV 4.5.5. Whole processes.
+   `truedepth audit` (without its report, and with it) against `opencv_paper.py` with OpenCV 4.5.5. Whole processes.
 2. Detection alone, per frame on one thread, on every calibration frame, against OpenCV 4.5.5 and the newest 4.x.
 
 The runs of the rivals alternate, so that a busy moment of the machine hits all; the best of N counts.
@@ -72,10 +72,11 @@ def machine():
 
 
 def whole_job(truedepth, old, recording, runs):
-    paper, auto, reference = [], [], []
+    job, paper, auto, reference = [], [], [], []
     with tempfile.TemporaryDirectory() as folder:
         report = ["-q", "-o", os.path.join(folder, "report"), recording]
         for _ in range(runs):
+            job.append(run([truedepth, "audit", "--method", "paper", "--json", "-q", recording], (0, 3)))
             paper.append(run([truedepth, "audit", "--method", "paper", "--json", *report], (0, 3)))
             auto.append(run([truedepth, "audit", *report], (0, 3)))
             reference.append(run([old, str(HERE / "opencv_paper.py"), recording]))
@@ -98,6 +99,7 @@ def whole_job(truedepth, old, recording, runs):
 
     print(f"Whole job, {result['n_images']} frames (whole processes, best of {runs})")
     row(f"OpenCV {result['opencv']}, Python", rival)
+    row("truedepth, paper's job, no page", best(job))
     row("truedepth audit --method paper", best(paper))
     row("truedepth audit", best(auto))
     print(f"  (OpenCV without starting Python and importing: {inside_s:.3f} s)")
@@ -126,7 +128,7 @@ def detection(truedepth, old, new, images, runs):
     print(f"Detection, {len(images)} frames, one thread (mean per frame, best of {runs})")
     ours = rivals["truedepth detect"][0]
     for name, (ms, n_corners) in rivals.items():
-        print(f"  {name:<38} {ms:>8.2f} ms   {n_corners} corners   ratio {ours / ms:.2f}")
+        print(f"  {name:<38} {ms:>8.2f} ms   {n_corners} corners   ratio {ours / ms:.3f}")
 
 
 def keep(rivals, name, ms, n_corners):

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     board::CharucoBoard,
-    calibrate::{Calibration, Estimate, abreast},
+    calibrate::{Calibration, Estimate, abreast, both},
     camera::Camera,
     geom::Pixel,
     pose::View,
@@ -201,18 +201,23 @@ pub fn register(input: &RegisterInput<'_>) -> Option<Registration> {
         let gains: Vec<_> = planes.iter().map(|plane| plane.gain).collect();
         between_frames(planes, &gains, theta, &prior)
     };
-    let mut theta = prior.mean;
-    for _ in 0..12 {
-        let step = step_at(&planes_at(&theta, false)?, &theta)?;
-        theta += step.delta;
-        if step.delta.component_div(&prior.sigma()).amax() < 1e-7 {
-            break;
+    let by_slopes = || {
+        let mut theta = prior.mean;
+        for _ in 0..12 {
+            let step = step_at(&planes_at(&theta, false)?, &theta)?;
+            theta += step.delta;
+            if step.delta.component_div(&prior.sigma()).amax() < 1e-7 {
+                break;
+            }
         }
-    }
-    // What the camera's numbers do costs more than all else, and only counts where the others are best.
-    let planes = planes_at(&theta, true)?;
-    let step = step_at(&planes, &theta)?;
-    theta += step.delta;
+        // What the camera's numbers do costs more than all else, and only counts where the others are best.
+        let planes = planes_at(&theta, true)?;
+        let step = step_at(&planes, &theta)?;
+        theta += step.delta;
+        Some((planes, step, theta))
+    };
+    let (print, found) = both(|| Print::new(board), by_slopes);
+    let (planes, step, theta) = found?;
     let textures: Vec<&Texture> = frames.iter().map(|(_, patches)| &patches.texture).collect();
     let look = |frame: usize, place: &Place, at| {
         let mut pixel = place.looked_at(at);
@@ -223,7 +228,6 @@ pub fn register(input: &RegisterInput<'_>) -> Option<Registration> {
         scene.spot(frames[frame].0, pixel)
     };
     let lens = scene.lens.as_ref();
-    let print = Print::new(board);
     let print_seen = imprint::find(&print, scene.place(&theta), &textures, look, lens);
     // Frames as the planes count them.
     let of_frame = |texture: usize| frames[texture].0.frame;
