@@ -111,16 +111,21 @@ pub fn temporal_noise(frames: &[Option<(&[Corner], &Patches)>]) -> TemporalNoise
             .map(|patch| (patch.inverse_per_m.recip(), patch.noise_m))
             .collect();
         for (bin, pixels) in compared(&before.1.lattice, &after.1.lattice) {
-            if pixels.len() < LEAST_PIXELS {
+            let near: Vec<f64> = one_frame
+                .iter()
+                .filter(|(depth_m, _)| range_bin(*depth_m) == bin)
+                .map(|(_, noise_m)| *noise_m)
+                .collect();
+            // Pixels just beyond a distance may have no patch of their own.
+            if pixels.len() < LEAST_PIXELS || near.is_empty() {
                 continue;
             }
             let residuals: Vec<f64> = pixels.iter().map(|(_, residual_m)| *residual_m).collect();
-            let near = one_frame.iter().filter(|(depth_m, _)| range_bin(*depth_m) == bin);
             bins.entry(bin).or_default().push(PairAtRange {
                 depth_m: median(&pixels.iter().map(|(depth_m, _)| *depth_m).collect::<Vec<_>>()),
                 // Both frames' noise is in the difference.
                 variance: 0.5 * mad_sigma(&residuals, 0.0).powi(2),
-                one_frame_m: median(&near.map(|(_, noise_m)| *noise_m).collect::<Vec<_>>()),
+                one_frame_m: median(&near),
                 n: pixels.len(),
             });
         }
