@@ -15,7 +15,7 @@ fn what_is_printed_can_be_detected() {
     let toml = fs::read_to_string(scratch.join("out/board.toml")).expect("it was written");
     assert_eq!(
         toml,
-        "squares_x = 10\nsquares_y = 7\nsquare = \"24mm\"\nmarker = \"18mm\"\ndictionary = \"5X5_100\"\n\
+        "squares_x = 10\nsquares_y = 7\nsquare = \"24mm\"\nmarker = \"15mm\"\ndictionary = \"5X5_100\"\n\
          layout = \"new\"\n"
     );
     let found = run("detect out/board.png --board out/board.toml").code(0).stdout;
