@@ -158,7 +158,7 @@ const NOISE_GROWTH_PER_M: f64 = 2.2e-3;
 /// **The board's rim** is not where it is thought to be where the board is wavy: its heights are known at the corners,
 /// and a third of its surface lies beyond the outermost of them. That error is the same in all frames, and so neither
 /// noise of the poses nor of the sensor: its plane is three more unknowns, known beforehand as well as the heights of
-/// the corners tell of what is beyond them ([`Relief::plane_covariance`]).
+/// the corners tell of what is beyond them.
 ///
 /// **σ** is the larger of this model's and of a sandwich estimator clustered by frame, and to it is added what the
 /// camera's own covariance does (poses and rays follow each number of the camera). Not in it: a wrong square length
