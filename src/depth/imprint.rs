@@ -568,7 +568,7 @@ fn total(normals: &[Normal]) -> (Matrix5<f64>, Vector5<f64>) {
 mod tests {
     use nalgebra::Rotation2;
 
-    use super::*;
+    use super::{super::test_noise::Noise, *};
 
     const CENTER: Pixel = Pixel { x: 319.5, y: 239.5 };
 
@@ -587,19 +587,6 @@ mod tests {
 
     fn place(zoom: f64, shift_px: [f64; 2]) -> Place {
         Place { center: CENTER, zoom, shift_px, lens: 0.0 }
-    }
-
-    /// Normal numbers, always the same ones.
-    struct Noise(u64);
-
-    impl Noise {
-        fn normal(&mut self) -> f64 {
-            let mut uniform = || {
-                self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-                (self.0 >> 11) as f64 / (1u64 << 53) as f64
-            };
-            (0..12).map(|_| uniform()).sum::<f64>() - 6.0
-        }
     }
 
     /// A depth map with the print in it, that lies at this place; noise of 0.3 mm.

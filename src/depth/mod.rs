@@ -48,6 +48,8 @@ mod register;
 mod relief;
 mod stance;
 mod temporal;
+#[cfg(test)]
+mod test_noise;
 
 pub(crate) use against_board::corner_on;
 pub use against_board::{BoardDepth, FrameDepth, MAX_ERROR_M, Sample, against_board, sense};

@@ -215,21 +215,8 @@ fn compared(before: &Lattice, after: &Lattice) -> BTreeMap<usize, Vec<(f64, f64)
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::test_noise::Noise, *};
     use crate::{board::CharucoBoard, depth::patches};
-
-    /// Normal numbers, always the same ones.
-    struct Noise(u64);
-
-    impl Noise {
-        fn normal(&mut self) -> f64 {
-            let mut uniform = || {
-                self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
-                (self.0 >> 11) as f64 / (1u64 << 53) as f64
-            };
-            (0..12).map(|_| uniform()).sum::<f64>() - 6.0
-        }
-    }
 
     /// A slanting board that comes nearer by 0.2 mm and turns a little from frame to frame, before a sensor with a
     /// pattern of 0.3 mm that stays; its corners move by so many pixels.

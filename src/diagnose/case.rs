@@ -101,6 +101,12 @@ impl Case<'_> {
         self.observations.iter().filter(|o| !o.corners.is_empty()).count()
     }
 
+    /// Frames whose markers read only as in a mirror, and all whose markers read.
+    pub(super) fn n_mirrored_of(&self) -> (usize, usize) {
+        let identified = self.observations.iter().filter_map(|o| o.identity.as_ref());
+        identified.fold((0, 0), |(n_mirrored, n), i| (n_mirrored + usize::from(i.mirrored), n + 1))
+    }
+
     /// Why nothing that rests on the own calibration is to be judged, for the end of a sentence; `None` where it fits.
     pub(super) fn poor_fit(&self) -> Option<String> {
         let rms_px = self.calibration?.rms_px;

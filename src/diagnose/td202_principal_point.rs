@@ -23,8 +23,7 @@ fn measured(case: &Case<'_>, state: DistortionState) -> Option<[Estimate; 2]> {
 fn expected(case: &Case<'_>, own: [Estimate; 2]) -> Option<([f64; 2], bool)> {
     let Intrinsics { cx, cy, width, .. } = case.factory?.intrinsics;
     let mirrored_x = width as f64 - 1.0 - cx;
-    let n = case.observations.iter().filter_map(|o| o.identity.as_ref());
-    let (n, mirrored) = n.fold((0, 0), |(n, m), i| (n + 1, m + usize::from(i.mirrored)));
+    let (mirrored, n) = case.n_mirrored_of();
     let off = |x: f64| (own[0].value - x).abs();
     if 2 * mirrored > n && off(mirrored_x) < off(cx) {
         Some(([mirrored_x, cy], true))

@@ -5,9 +5,7 @@ use crate::depth::Handedness;
 
 pub(super) fn check(case: &Case<'_>) -> Finding {
     let mut finding = Finding::new(Code::TD403, Unit::Count);
-    let identified: Vec<_> = case.observations.iter().filter_map(|o| o.identity.as_ref()).collect();
-    let n = identified.len();
-    let mirrored = identified.iter().filter(|i| i.mirrored).count();
+    let (mirrored, n) = case.n_mirrored_of();
     if n == 0 {
         finding.summary =
             "Cannot tell whether the images are mirrored: the board was not seen in any frame."
