@@ -15,6 +15,9 @@ import numpy as np
 
 HUBER, FLOOR_PX, HEIGHT_SIGMA_M = 3.0, 0.08, 5e-4
 VELOCITY_SIGMA = np.r_[[0.004] * 3, [0.001] * 3]
+# The paper's board.
+SQUARE_M, COLUMNS, ROWS = 0.020875, 9, 7
+BOARD = np.array([[(i % COLUMNS + 1) * SQUARE_M, (i // COLUMNS + 1) * SQUARE_M, 0] for i in range(COLUMNS * ROWS)])
 
 
 def skew(v):
@@ -125,11 +128,10 @@ class Problem:
         return shared, poses
 
 
-def main():
-    detected, calibration = (json.load(open(path)) for path in sys.argv[1:3])
+def load(detect_json, calibrate_json):
+    """Views (corners' ids, pixels, weights), poses and numbers to start from, image size, frames and name."""
+    detected, calibration = (json.load(open(path)) for path in (detect_json, calibrate_json))
     left_out = {(o["frame"], o["id"]) for o in calibration["outliers"]}
-    square, columns = 0.020875, 9
-    board = np.array([[(i % columns + 1) * square, (i // columns + 1) * square, 0] for i in range(63)])
     views, poses, frames = [], [], []
     for view in calibration["views"]:
         corners = detected["images"][view["frame"]]["corners"]
@@ -140,10 +142,15 @@ def main():
         views.append((ids, seen, 1 / (sigma**2 + FLOOR_PX**2)))
         frames.append(view["frame"])
         poses.append((turn(np.array(view["rotation_vector_rad"])), np.array(view["translation_m"]), np.zeros(6)))
-    start = np.r_[calibration["focal_px"], calibration["principal_point_px"], np.zeros(5 + len(board))]
-    print(calibration["recording"])
+    start = np.r_[calibration["focal_px"], calibration["principal_point_px"], np.zeros(5 + len(BOARD))]
+    return views, poses, start, calibration["image_size_px"], frames, calibration["recording"]
+
+
+def main():
+    views, poses, start, size, frames, recording = load(*sys.argv[1:3])
+    print(recording)
     for moving in (False, True):
-        problem = Problem(views, board, calibration["image_size_px"], moving)
+        problem = Problem(views, BOARD, size, moving)
         shared, found = problem.solve(start, poses)
         squares = [(problem.view(i, shared, pose, False)[0] ** 2).sum(1) for i, pose in enumerate(found)]
         rms = np.sqrt(np.concatenate(squares).mean())
@@ -162,4 +169,5 @@ def main():
         print(f"  {name:<6} correlation {correlation:+.2f}, all rows read in {500 * slope:.1f} ms")
 
 
-main()
+if __name__ == "__main__":
+    main()

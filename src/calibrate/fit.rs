@@ -4,15 +4,15 @@ use super::{
     Estimate,
     model::{Center, Shape},
     motion::{Joint, MeanMotion},
-    problem::{Measured, Reprojection},
+    problem::{MOTION_SIGMA, Measured, Reprojection},
     surface::{Form, Sheet},
 };
 use crate::{
     camera::Intrinsics,
     geom::{Board, Color, Pose},
     solve::{
-        Arrow, ArrowNormal, BySchur, DenseCholesky, Effort, Loss, Pooled, Reduced, larger,
-        minimize, total,
+        Arrow, ArrowNormal, BySchur, DenseCholesky, Effort, Loss, Pooled, Reduced, covariance_of,
+        larger, minimize, total, units,
     },
 };
 
@@ -67,8 +67,9 @@ pub(super) struct Fit {
     /// The heights of the board's corners, metres; none unless the surface is free.
     pub(super) knots_m: Vec<f64>,
     pub(super) poses: Vec<Pose<Color, Board>>,
-    /// Covariance of `free` and after these `knots_m`, row-major; `None` where the views do not determine them. What
-    /// is not the camera's has the larger of both variances only where [`Wanted::Everything`] was.
+    /// Covariance of `free` and after these `knots_m`, row-major; `None` where the views do not determine them. Where
+    /// [`Wanted::Everything`] was, that of the knots' heights from the board's own plane, the larger of both variances
+    /// each; else classical, and from where the poses are counted.
     pub(super) covariance: Option<Vec<f64>>,
     /// For each picture the (robust, weighted) sum of squares with the intrinsics of all others; infinite where
     /// these do not determine them.
@@ -105,6 +106,8 @@ impl Fit {
 /// The same fit with a velocity for each view, one step of the normal equations away.
 #[derive(Clone, Debug)]
 pub(super) struct Shutter {
+    /// The σ of a view's turn from its first row to its last that is likeliest of a few, radians.
+    pub(super) turn_sigma_rad: f64,
     /// The residuals' standard deviation as a share of what it is without.
     pub(super) share: f64,
     /// By how much `free` and after these `knots_m` move.
@@ -173,11 +176,20 @@ fn fit_sized<const S: usize>(shape: Shape<'_>, data: &Data<'_>, start: Start<'_>
     all.add(&minimum.normal.prior);
     let pooled = Pooled::new(&all, &pictures)
         .filter(|pooled| reducible && is_determined(pooled, &diagonal, n));
-    let n_sigmas = if data.wanted == Wanted::Everything { n } else { S };
+    // Heights from a plane that no picture tells from the poses are as unsure as beforehand, all of them alike, and
+    // what makes the residuals of a picture alike is lost in that: heights from the board's own plane are asked for.
+    let mut sums = units(n);
+    match data.wanted {
+        Wanted::Everything => data.sheet.take_planes_out(shape.surface, &mut sums),
+        Wanted::Camera => sums.truncate(S),
+    }
     let covariance = pooled.as_ref().map(|pooled| {
-        let classical: Vec<f64> = pooled.classical().iter().map(|c| variance * c).collect();
+        let mut classical: Vec<f64> = pooled.classical().iter().map(|c| variance * c).collect();
+        if data.wanted == Wanted::Everything {
+            classical = covariance_of(&sums, &classical);
+        }
         // With a single picture there is only the classical one.
-        match pooled.clustered(n_sigmas) {
+        match pooled.clustered_of(&sums) {
             Some(clustered) => larger(&classical, &clustered),
             None => classical,
         }
@@ -233,35 +245,53 @@ fn is_determined<const S: usize>(pooled: &Pooled<'_>, diagonal: &[f64; S], n: us
     })
 }
 
+/// How fast views may move, as shares of what a hand does at the most.
+const MOTION_SHARES: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
+
 /// Would velocities explain the residuals, and what would they change? `None` where the views do not determine them.
+///
+/// How fast views move is not known beforehand; the more they may, the less they tell of everything else. Of four
+/// speeds the likeliest is taken: the velocities are integrated out, and the residuals' own variance is the one of
+/// greatest likelihood (up to what is the same for all speeds,
+/// −2·ln likelihood = N·ln(sum of squares) + Σ (ln det V − ln det P), V the normal equations of a view's own numbers, P
+/// the prior's share of it).
 fn shutter<const S: usize>(
     problem: &Reprojection<'_, S>,
     normal: &ArrowNormal<S, 6>,
     (shared, knots_m): (&[f64; S], &[f64]),
     poses: &[Pose<Color, Board>],
 ) -> Option<Shutter> {
-    let mut all = normal.prior.clone();
-    let (mut gain, mut cost, mut n_residuals) = (0.0, 0.0, 0);
-    for (index, pose) in poses.iter().enumerate() {
-        let block = problem.moving_view(index, (shared, knots_m), pose)?;
-        gain += block.block_gain()?;
-        cost += 2.0 * block.cost();
-        n_residuals += 2 * problem.views[index].corners.len();
-        if !block.reduce_into(&mut all) {
-            return None;
+    let n_residuals: usize = problem.views.iter().map(|view| 2 * view.corners.len()).sum();
+    let likely = |motion: f64| -> Option<(f64, Shutter)> {
+        let sigma = MOTION_SIGMA.map(|sigma| motion * sigma);
+        let mut all = normal.prior.clone();
+        let (mut gain, mut cost, mut unlikely) = (0.0, 0.0, 0.0);
+        for (index, pose) in poses.iter().enumerate() {
+            let block = problem.moving_view(index, (shared, knots_m), pose, sigma)?;
+            let (by_own, log_determinant) = block.block_gain()?;
+            gain += by_own;
+            unlikely += log_determinant + 2.0 * sigma.iter().map(|sigma| sigma.ln()).sum::<f64>();
+            cost += 2.0 * block.cost();
+            if !block.reduce_into(&mut all) {
+                return None;
+            }
         }
-    }
-    let shift = DenseCholesky::new(all.information.clone(), all.n())?.solve(&all.score);
-    gain += shift.iter().zip(&all.score).map(|(step, score)| step * score).sum::<f64>();
-    let degrees = |per_view: usize| {
-        n_residuals
-            .checked_sub(all.n() + per_view * poses.len())
-            .filter(|d| *d > 0)
-            .map(|d| d as f64)
+        let shift = DenseCholesky::new(all.information.clone(), all.n())?.solve(&all.score);
+        gain += shift.iter().zip(&all.score).map(|(step, score)| step * score).sum::<f64>();
+        let degrees = |per_view: usize| {
+            n_residuals
+                .checked_sub(all.n() + per_view * poses.len())
+                .filter(|d| *d > 0)
+                .map(|d| d as f64)
+        };
+        let still = cost / degrees(6)?;
+        let left = (cost - gain).max(0.0);
+        unlikely += n_residuals as f64 * left.ln();
+        let share = (left / degrees(12)? / still).sqrt();
+        Some((unlikely, Shutter { turn_sigma_rad: sigma[0], share, shift }))
     };
-    let still = cost / degrees(6)?;
-    let moving = (cost - gain).max(0.0) / degrees(12)?;
-    Some(Shutter { share: (moving / still).sqrt(), shift })
+    let all: Option<Vec<_>> = MOTION_SHARES.into_iter().map(likely).collect();
+    all?.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, shutter)| shutter)
 }
 
 fn mean_motion<const S: usize>(

@@ -239,6 +239,7 @@ fn assemble(
         surfaces: prepared.surfaces,
         left_out: left_out(&prepared.views, &prepared.pictures, &fit.left_out_focal_px),
         rolling_shutter: fit.shutter.as_ref().map(|shutter| RollingShutter {
+            turn_sigma_rad: shutter.turn_sigma_rad,
             residual_share: shutter.share,
             focal_shift_px: shutter.shift[0],
             center_shift_px: (shape.center == Center::Free)

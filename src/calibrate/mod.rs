@@ -273,7 +273,7 @@ pub struct LeftOutPicture {
 }
 
 /// What is left of the residuals where each view may turn and shift while the rows of its image are read, one after
-/// the other: to first order, with 4 mrad and 2 mm known beforehand. (Hand-held cameras with a rolling shutter do.)
+/// the other: to first order. (Hand-held cameras with a rolling shutter do.)
 ///
 /// The calibration does not correct for it: the velocities of single views are known too badly, and freeing them
 /// costs more than it mends. What they do to the focal length differs from view to view: it averages out, and σ
@@ -282,6 +282,9 @@ pub struct LeftOutPicture {
 /// Said beside the result so that who wants better holds the device still.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RollingShutter {
+    /// How far a view turns while all rows are read (one standard deviation, radians): the likeliest of 4, 2, 1 and
+    /// 0.5 mrad, half a millimetre of shift going with each milliradian.
+    pub turn_sigma_rad: f64,
     /// The residuals' standard deviation with motion as a share of that without; degrees of freedom are counted, so
     /// that it is near one where nothing moves.
     pub residual_share: f64,

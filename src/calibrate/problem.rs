@@ -198,9 +198,9 @@ impl Ready<'_> {
     }
 }
 
-/// How far a view may turn (radians) and shift (metres) while the rows of its image are read: a hand leads a camera by
-/// a quarter of a radian and some centimetres a second, and reading takes some ten milliseconds.
-const MOTION_SIGMA: [f64; 6] = [4e-3, 4e-3, 4e-3, 2e-3, 2e-3, 2e-3];
+/// How far a view may turn (radians) and shift (metres) while the rows of its image are read, at the most: a hand leads
+/// a camera by a quarter of a radian and some centimetres a second, and reading takes up to some ten milliseconds.
+pub(super) const MOTION_SIGMA: [f64; 6] = [4e-3, 4e-3, 4e-3, 2e-3, 2e-3, 2e-3];
 
 /// Eight points after a rotation.
 #[inline(always)]
@@ -378,16 +378,17 @@ impl<const S: usize> Reprojection<'_, S> {
     }
 
     /// The normal equations of a view that moves while its rows are read: its pose, and by how much it turns and shifts
-    /// from the first row to the last; `None` outside the problem's domain.
+    /// from the first row to the last, known beforehand to these σ; `None` outside the problem's domain.
     pub(super) fn moving_view(
         &self,
         index: usize,
         numbers: (&[f64; S], &[f64]),
         pose: &Pose<Color, Board>,
+        motion_sigma: [f64; 6],
     ) -> Option<BlockNormal<S, 12>> {
         let mut normal = BlockNormal::ZERO;
         let whole = self.add_view::<Moving, 12>(index, numbers, pose, &mut normal);
-        for (k, sigma) in MOTION_SIGMA.into_iter().enumerate() {
+        for (k, sigma) in motion_sigma.into_iter().enumerate() {
             let mut unit = [0.0; 12];
             unit[6 + k] = 1.0;
             normal.add_row(sigma.powi(-2), 0.0, &[0.0; S], &unit);

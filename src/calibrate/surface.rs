@@ -78,6 +78,7 @@ pub(super) struct Sheet {
     /// How the heights of the corners follow from those of the knots; `None` where corners are knots.
     mixture: Option<Mixture>,
     corners: Vec<Vector3<f64>>,
+    knots: Vec<Vector3<f64>>,
 }
 
 impl Sheet {
@@ -123,15 +124,22 @@ impl Sheet {
             })
             .collect();
         let precision = DenseCholesky::new(covariance, n).map(|factor| factor.inverse());
-        Self { precision: precision.unwrap_or_default(), mixture, corners, ..flat }
+        Self { precision: precision.unwrap_or_default(), mixture, corners, knots, ..flat }
     }
 
     /// A board of which no free surface is asked.
     pub(super) fn flat(board: &CharucoBoard) -> Self {
         let half = [board.squares_x, board.squares_y].map(|n| 0.5 * n as f64 * board.square_m);
         let sigma_m = SIGMA_SHARE * 2.0 * half[0].max(half[1]);
-        let (precision, mixture, corners) = (Vec::new(), None, Vec::new());
-        Self { center: half, half, sigma_m, precision, mixture, corners }
+        Self {
+            center: half,
+            half,
+            sigma_m,
+            precision: Vec::new(),
+            mixture: None,
+            corners: Vec::new(),
+            knots: Vec::new(),
+        }
     }
 
     /// Was it made for this surface?
@@ -238,6 +246,20 @@ impl Sheet {
                 [plane.z, -plane.y, 0.0, 0.0, 0.0, plane.x]
             })
             .collect()
+    }
+
+    /// Of the sums of numbers that are the numbers themselves, those of a free surface's knots (the last) become their
+    /// heights from the board's own plane.
+    pub(super) fn take_planes_out(&self, surface: Surface, numbers: &mut [Vec<f64>]) {
+        let n_knots = self.n_knots(surface);
+        let first = numbers.len() - n_knots;
+        let by_knot = &self.by_numbers(surface)[surface.n_shared()..];
+        let planes: Vec<_> = by_knot.iter().map(|by| best_plane(&self.corners, by)).collect();
+        for (weights, at) in numbers[first..].iter_mut().zip(&self.knots) {
+            for (weight, plane) in weights[first..].iter_mut().zip(&planes) {
+                *weight -= plane.x + plane.y * at.x + plane.z * at.y;
+            }
+        }
     }
 
     /// The board's own plane (the best one through its corners) in the frame that these numbers count heights from:

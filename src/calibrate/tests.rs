@@ -431,34 +431,64 @@ fn says_what_is_missing() {
     );
 }
 
+/// The camera turns (radians about x, y, z, to first order) while the rows of each frame are read.
+fn turning(frames: &mut [FrameCorners], mut turn: impl FnMut() -> [f64; 3]) {
+    for frame in frames {
+        let turn = turn();
+        for corner in &mut frame.corners {
+            let (f, time) = (531.0, corner.pixel.y / 480.0 - 0.5);
+            let [x, y] = [(corner.pixel.x - 321.5) / f, (corner.pixel.y - 240.4) / f];
+            let [a, b, c] = turn.map(|t| t * time);
+            corner.pixel.x += f * (-a * x * y + b * (1.0 + x * x) - c * y);
+            corner.pixel.y += f * (-a * (1.0 + y * y) + b * x * y + c * x);
+        }
+    }
+}
+
 /// Views that turn by 6 mrad while they are read are told from still ones, and σ clustered by picture knows of it.
 #[test]
 fn tells_a_rolling_shutter() {
     let scene = Scene { n_views: 20, ..Scene::new(Distortion::None) };
     let still = run(&scene.frames(4), None, Method::Robust(Model::FocalCentre)).unwrap();
-    let share = still.rolling_shutter.unwrap().residual_share;
-    assert!((0.9..1.1).contains(&share), "{share}");
+    let still = still.rolling_shutter.unwrap();
+    assert!((0.9..1.1).contains(&still.residual_share), "{still:?}");
+    assert!(still.turn_sigma_rad < 6e-4, "{still:?}");
     let mut random = Random(5);
     let mut squares = 0.0;
     for seed in 0..6 {
         let mut frames = scene.frames(seed);
-        for frame in &mut frames {
-            let turn = [(); 3].map(|()| 6e-3 * random.normal());
-            for corner in &mut frame.corners {
-                // Small turns of the camera about x, y, z move what is seen by these, to first order.
-                let (f, time) = (531.0, corner.pixel.y / 480.0 - 0.5);
-                let [x, y] = [(corner.pixel.x - 321.5) / f, (corner.pixel.y - 240.4) / f];
-                let [a, b, c] = turn.map(|t| t * time);
-                corner.pixel.x += f * (-a * x * y + b * (1.0 + x * x) - c * y);
-                corner.pixel.y += f * (-a * (1.0 + y * y) + b * x * y + c * x);
-            }
-        }
+        turning(&mut frames, || [(); 3].map(|()| 6e-3 * random.normal()));
         let found = run(&frames, None, Method::Robust(Model::FocalCentre)).unwrap();
         let shutter = found.rolling_shutter.unwrap();
-        assert!(shutter.residual_share < 0.8, "{shutter:?}");
+        assert!(shutter.residual_share < 0.8 && shutter.turn_sigma_rad > 3e-3, "{shutter:?}");
         squares += normalised(found.focal_px(), 531.0).powi(2) / 6.0;
     }
     assert!(squares < 3.0, "{squares}");
+}
+
+/// The σ of a board's shape where views turn while they are read, most of it the same way each time.
+#[test]
+fn knows_the_shape_of_a_board_seen_in_motion() {
+    let wave = [0.6, 0.3, -0.7, 0.8];
+    let truth = true_heights_m(wave, 5e-4);
+    let mut random = Random(8);
+    const N: u64 = 8;
+    let (mut squares, mut sigma_m) = (0.0, 0.0);
+    for seed in 0..N {
+        let mut frames = views_of(wave, 5e-4, seed);
+        turning(&mut frames, || [0.0, 0.0, 4e-3].map(|same| same + 1e-3 * random.normal()));
+        let found = run(&frames, None, Method::Robust(Model::FocalCentre)).unwrap();
+        let surface = found.surface.unwrap();
+        assert_eq!(surface.kind, SurfaceKind::Free);
+        for (id, height_m) in truth.iter().enumerate() {
+            let off = (surface.heights_m[id] - height_m) / surface.sigmas_m[id];
+            squares += off * off / (N as f64 * truth.len() as f64);
+        }
+        sigma_m += mean(&surface.sigmas_m) / N as f64;
+    }
+    println!("z² {squares:.2}, σ {:.1} µm", 1e6 * sigma_m);
+    assert!((0.5..1.6).contains(&squares), "{squares}");
+    assert!(sigma_m < 3e-5, "{sigma_m}");
 }
 
 /// The more the views leave open, the more a wrong calibration may cost; and it says where.

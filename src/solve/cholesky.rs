@@ -41,6 +41,11 @@ impl<const N: usize> Cholesky<N> {
         Some(Self { factor: l })
     }
 
+    /// The logarithm of the matrix' determinant.
+    pub fn log_determinant(&self) -> f64 {
+        (0..N).map(|i| -2.0 * self.factor[i][i].ln()).sum()
+    }
+
     /// L⁻¹·b
     pub fn forward(&self, b: &[f64; N]) -> [f64; N] {
         let l = &self.factor;

@@ -39,30 +39,35 @@ impl<'a> Pooled<'a> {
 
     /// The variances of the first `n_wanted` parameters if residuals are independent only *between* the parts: within
     /// a part they may be correlated in any way. `None` where a part alone determines one of them.
+    pub fn clustered(&self, n_wanted: usize) -> Option<Vec<f64>> {
+        self.clustered_of(&units(self.n)[..n_wanted])
+    }
+
+    /// The same of sums of parameters, each given by its weights.
     ///
-    /// The sandwich estimator, each part's influence on a parameter scaled such that the estimate is unbiased where
-    /// the residuals happen to be independent after all: the idea of the correction CR2 (Bell and McCaffrey, *Bias
-    /// reduction in standard errors for linear regression with multi-stage samples*, 2002), for one parameter at a
-    /// time.
+    /// The sandwich estimator, each part's influence on a sum scaled such that the estimate is unbiased where the
+    /// residuals happen to be independent after all: the idea of the correction CR2 (Bell and McCaffrey, *Bias
+    /// reduction in standard errors for linear regression with multi-stage samples*, 2002), for one sum at a time.
     ///
     /// ```text
-    /// S = ΣSᵢ + prior,  q = S⁻¹·unit,  tᵢ = qᵀ·Sᵢ·q,  vᵢ = tᵢ − qᵀ·Sᵢ·S⁻¹·Sᵢ·q
+    /// S = ΣSᵢ + prior,  q = S⁻¹·weights,  tᵢ = qᵀ·Sᵢ·q,  vᵢ = tᵢ − qᵀ·Sᵢ·S⁻¹·Sᵢ·q
     /// variance = Σ (qᵀ·scoreᵢ)²·tᵢ/vᵢ + qᵀ·prior·q
     /// ```
-    pub fn clustered(&self, n_wanted: usize) -> Option<Vec<f64>> {
+    pub fn clustered_of(&self, sums: &[Vec<f64>]) -> Option<Vec<f64>> {
         vectorized(
             #[inline(always)]
-            || self.clustered_of(n_wanted),
+            || self.variances_of(sums),
         )
     }
 
     #[inline(always)]
-    fn clustered_of(&self, n_wanted: usize) -> Option<Vec<f64>> {
+    fn variances_of(&self, sums: &[Vec<f64>]) -> Option<Vec<f64>> {
         let n = self.n;
-        let mut variances = Vec::with_capacity(n_wanted);
-        let (mut sq, mut rsq) = (vec![0.0; n], vec![0.0; n]);
-        for wanted in 0..n_wanted {
-            let q = &self.inverse[wanted * n..(wanted + 1) * n];
+        let mut variances = Vec::with_capacity(sums.len());
+        let [mut q, mut sq, mut rsq] = [(); 3].map(|()| vec![0.0; n]);
+        for weights in sums {
+            times(&self.inverse, weights, &mut q);
+            let (q, whole) = (&q[..], dot(&q, weights));
             let mut sum = 0.0;
             let mut from_parts = 0.0;
             for part in self.parts {
@@ -72,15 +77,15 @@ impl<'a> Pooled<'a> {
                 let v = t - dot(&sq, &rsq);
                 if t > 0.0 {
                     if !(v > 1e-9 * t) {
-                        return None; // This part alone determines the parameter: nothing to compare it with.
+                        return None; // This part alone determines the sum: nothing to compare it with.
                     }
                     sum += dot(q, &part.score).powi(2) * t / v;
                 }
                 from_parts += t;
             }
-            let prior = (q[wanted] - from_parts).max(0.0);
+            let prior = (whole - from_parts).max(0.0);
             // Rounding of a difference of equal numbers is no prior.
-            variances.push(if prior > 1e-9 * q[wanted] { sum + prior } else { sum });
+            variances.push(if prior > 1e-9 * whole { sum + prior } else { sum });
         }
         Some(variances)
     }
@@ -131,6 +136,23 @@ pub fn larger(covariance: &[f64], variances: &[f64]) -> Vec<f64> {
         .map(|i| variances.get(i).map_or(1.0, |v| (v / covariance[i * n + i]).sqrt().max(1.0)))
         .collect();
     (0..n * n).map(|at| covariance[at] * factor[at / n] * factor[at % n]).collect()
+}
+
+/// The weights of sums that are the parameters themselves.
+pub fn units(n: usize) -> Vec<Vec<f64>> {
+    (0..n).map(|i| (0..n).map(|j| if i == j { 1.0 } else { 0.0 }).collect()).collect()
+}
+
+/// The covariance of sums of parameters from that of the parameters: W·C·Wᵀ, row-major, W's rows the sums' weights.
+pub fn covariance_of(sums: &[Vec<f64>], covariance: &[f64]) -> Vec<f64> {
+    let n = covariance.len().isqrt();
+    let mut by = vec![0.0; n];
+    let mut out = Vec::with_capacity(sums.len() * sums.len());
+    for sum in sums {
+        times(covariance, sum, &mut by);
+        out.extend(sums.iter().map(|other| dot(&by, other)));
+    }
+    out
 }
 
 /// A square matrix (row-major) times a vector.

@@ -62,7 +62,7 @@ mod mixture;
 mod covariance;
 
 pub use cholesky::{Cholesky, DenseCholesky};
-pub use covariance::{LeftOut, Pooled, larger, total};
+pub use covariance::{LeftOut, Pooled, covariance_of, larger, total, units};
 pub(crate) use lanes::{LANES, Rows, Sums, sum};
 pub use lm::{Effort, LeastSquares, Minimum, Solution, minimize};
 pub use loss::Loss;

@@ -337,10 +337,12 @@ impl<const S: usize, const B: usize> BlockNormal<S, B> {
         true
     }
 
-    /// hᵀ·V⁻¹·h: twice what moving the block's own parameters alone would gain; `None` where they are not determined.
-    pub fn block_gain(&self) -> Option<f64> {
-        let z = Cholesky::new(&self.v)?.forward(&self.h);
-        Some(z.iter().map(|z| z * z).sum())
+    /// hᵀ·V⁻¹·h, twice what moving the block's own parameters alone would gain, and the logarithm of V's determinant;
+    /// `None` where they are not determined.
+    pub fn block_gain(&self) -> Option<(f64, f64)> {
+        let factor = Cholesky::new(&self.v)?;
+        let z = factor.forward(&self.h);
+        Some((z.iter().map(|z| z * z).sum(), factor.log_determinant()))
     }
 
     /// The diagonal of U: what the block would say about each shared parameter if all others were known.

@@ -104,9 +104,9 @@ fn the_board_as_it_is() {
         }
         surfaces.push((name, surface));
     }
-    // The comparison: z² of heights averages 1 where σ are right; correlated errors of neighbours widen that. The
-    // pair of iPhone and 5th generation has 2.3: σ of both are too small by half for what the rolling shutter does
-    // (docs/method/calibrate.md).
+    // The comparison: z² of heights averages 1 where σ are right; correlated errors of neighbours widen that. 0.95 was
+    // measured between the iPads, which saw the sheet under one light; 1.8 and 2.3 to the iPhone, which saw it under
+    // another: there the taped paper is twisted by 0.07 mm more (docs/method/calibrate.md).
     for (i, (a, one)) in surfaces.iter().enumerate() {
         for (b, other) in &surfaces[..i] {
             let n = one.heights_m.len() as f64;
@@ -117,7 +117,9 @@ fn the_board_as_it_is() {
                 (ab, aa, bb) = (ab + h * g, aa + h * h, bb + g * g);
             }
             assert!(ab / (aa * bb).sqrt() > 0.975, "{a} and {b}: {}", ab / (aa * bb).sqrt());
-            assert!(z2 < 2.6, "{a} and {b}: {z2}");
+            println!("{a} and {b}: z² {z2:.2}");
+            let same_day = ![a, b].contains(&&IPHONE);
+            assert!(z2 < if same_day { 1.4 } else { 2.6 }, "{a} and {b}: {z2}");
         }
     }
 }

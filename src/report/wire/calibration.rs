@@ -163,6 +163,9 @@ pub struct LeftOut {
 /// What is left of the residuals where each view may move while the rows of its image are read.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RollingShutter {
+    /// How far a view turns while all rows are read (one standard deviation): the likeliest of a few.
+    #[serde(default)]
+    pub turn_sigma_mrad: Option<f64>,
     /// Their standard deviation as a share of that of still views; near 1 where nothing moved.
     pub residual_share: Option<f64>,
     /// What the focal length would change by.
@@ -377,6 +380,7 @@ impl Calibration {
                 .map(|l| LeftOut { frames: l.frames.clone(), focal_px: finite(l.focal_px) })
                 .collect(),
             rolling_shutter: calibration.rolling_shutter.map(|shutter| RollingShutter {
+                turn_sigma_mrad: finite(1e3 * shutter.turn_sigma_rad),
                 residual_share: finite(shutter.residual_share),
                 focal_shift_px: finite(shutter.focal_shift_px),
                 center_shift_px: shutter
