@@ -1,7 +1,8 @@
 //! The print, seen in the depth map: a second witness of zoom and shift.
 
 use nalgebra::{
-    Cholesky, Matrix2, Matrix3, Matrix5, SMatrix, SVector, Vector2, Vector3, Vector4, Vector5,
+    Cholesky, Matrix2, Matrix3, Matrix4, Matrix5, SMatrix, SVector, Vector2, Vector3, Vector4,
+    Vector5,
 };
 
 use super::{join::Seen, rays::RayGrid};
@@ -43,29 +44,36 @@ pub(super) struct PrintSeen {
     pub(super) with_lens: Option<Seen<4>>,
 }
 
-/// What the choice of the neighbourhood moves zoom and shift (px) by: on the published recordings, 25 or 65 pixels
+/// What the choice of the neighbourhood moves zoom and shift (px) by: on the published recordings, 35 or 55 pixels
 /// instead of 45 change them by so much, in no one direction. Leaving out frames does not tell of it.
-const NEIGHBOURHOOD_SIGMA: [f64; 3] = [0.0015, 0.25, 0.25];
+const NEIGHBOURHOOD_SIGMA: [f64; 3] = [0.0008, 0.12, 0.12];
 /// The same for the share of the other distortion state, of lenses that bend by some pixels.
 const NEIGHBOURHOOD_SIGMA_LENS: f64 = 0.1;
 
 /// The print's contrast must stand out of the noise by so much; the place is a ratio to it, biased and skewed where it
 /// does not (by 1/this² of itself).
 const LEAST_CONTRAST: f64 = 7.0;
-/// Steps towards the place; from a few pixels away three are enough.
-const MAX_STEPS: usize = 8;
-/// Steps below these are the last: a tenth of the best σ.
-const SMALL_STEP_PX: f64 = 0.02;
-const SMALL_STEP_ZOOM: f64 = 1e-4;
-const SMALL_STEP_LENS: f64 = 0.01;
+/// Steps towards the place; from a few pixels away five are enough.
+const MAX_STEPS: usize = 12;
+/// Steps of zoom, shift (px) and share below these are the last: a tenth of the best σ.
+const SMALL: [f64; 3] = [1e-4, 0.02, 0.01];
+/// No step is longer than this, an edge's width.
+const EDGE: [f64; 3] = [0.02, 3.0, 0.5];
+/// So near to the place all is linear.
+const LINEAR: [f64; 3] = [0.01, 1.0, 0.3];
+/// Steps of zoom, shift and share by which it is tried how the place follows.
+const TRIED: [f64; 4] = [5e-3, 0.5, 0.5, 0.1];
+/// What the normal equations say of a step, as a share of it, at the least: 0.7 to 1 in recordings.
+const LEAST_RESPONSE: f64 = 0.2;
 /// Fewer frames tell no σ.
 const LEAST_FRAMES: usize = 5;
 /// A frame with fewer cells says nothing.
 const LEAST_CELLS: usize = 200;
 /// The mean over so many cells to each side is taken out: of 640 pixels, 45.
 const REACH: usize = 4;
-/// How widely the sensor itself smooths, pixels (a Gaussian's σ). Only sharpens the comparison.
-const SENSOR_BLUR_PX: f64 = 3.0;
+/// How widely the sensor itself smooths, pixels (a Gaussian's σ): of 2 to 10, this explains most of the three published
+/// recordings' texture, or nearly. Where the sensor smooths otherwise the place is the same, and its σ a little larger.
+const SENSOR_BLUR_PX: f64 = 8.0;
 /// Tukey's constant: 95 % efficiency.
 const TUKEY: f64 = 4.685;
 
@@ -414,6 +422,12 @@ impl Place {
         Pixel::new(self.center.x + self.zoom * from.x, self.center.y + self.zoom * from.y)
     }
 
+    fn moved(&self, step: &Vector4<f64>) -> Self {
+        let [x, y] = self.shift_px;
+        let shift_px = [x + step.y, y + step.z];
+        Self { zoom: self.zoom + step.x, shift_px, lens: self.lens + step.w, ..*self }
+    }
+
     fn off_center(&self, at: Pixel) -> Vector2<f64> {
         let [dx, dy] = self.shift_px;
         Vector2::new(at.x - dx - self.center.x, at.y - dy - self.center.y)
@@ -472,7 +486,7 @@ impl Looks<'_> {
     /// The best place, from one that is right within half a square, and its covariance by leaving out each frame in
     /// turn (jackknife). With M = 5 the share of the other distortion state is free.
     fn best<const M: usize>(&self, start: Place) -> Option<Best<M>> {
-        let (place, normals) = self.converge::<M>(start)?;
+        let Converged { place, normals, step_by_off } = self.converge::<M>(start)?;
         let (information, score) = total(&normals);
         let all = solve::<M>(&information, &score)?;
         let n = normals.len() as f64;
@@ -480,8 +494,10 @@ impl Looks<'_> {
             .iter()
             .map(|normal| {
                 let others = (information - normal.information, score - normal.score);
-                let without = solve::<M>(&others.0, &others.1)?;
-                Some((normal.frame, (all - without) * ((n - 1.0) / n).sqrt()))
+                let mut by = all - solve::<M>(&others.0, &others.1)?;
+                let step = step_by_off * place_of(&by);
+                (1..M).for_each(|k| by[k] = step[k - 1]);
+                Some((normal.frame, by * ((n - 1.0) / n).sqrt()))
             })
             .collect::<Option<Vec<_>>>()?;
         let mut covariance = SMatrix::<f64, M, M>::zeros();
@@ -493,36 +509,80 @@ impl Looks<'_> {
         Some(Best { place, contrast_m: all[0], covariance, by_frame })
     }
 
-    /// The best place and the normal equations there.
-    fn converge<const M: usize>(&self, start: Place) -> Option<(Place, Vec<Normal>)> {
+    /// The best place, the normal equations there, and how it follows what they say that it is off.
+    fn converge<const M: usize>(&self, start: Place) -> Option<Converged> {
         let mut place = start;
-        let mut normals: Vec<Normal> = Vec::new();
-        let frames: Vec<usize> = (0..self.textures.len()).collect();
+        let mut step_by_off = None;
+        let mut normals = Vec::new();
         for _ in 0..MAX_STEPS {
-            let each = abreast(&frames, |&i| {
-                let spot = |pixel| (self.spot)(i, &place, pixel);
-                Normal::new(self.print, (i, self.textures[i]), &place, spot, self.lens)
-            });
-            normals = each.into_iter().flatten().collect();
-            let (information, score) = total(&normals);
-            let solved = solve::<M>(&information, &score)?;
-            let off = Vector4::from_fn(|k, _| solved.get(k + 1).copied().unwrap_or(0.0));
+            let off;
+            (normals, off) = self.off::<M>(&place)?;
+            if step_by_off.is_none() && longest(&off, &LINEAR) < 1.0 {
+                step_by_off = Some(self.step_by_off::<M>(&place, &off)?);
+            }
+            let step = step_by_off.map_or(off, |by| by * off);
             // A step longer than an edge is wide would leave what is linear.
-            let longest =
-                (off.y.hypot(off.z) / 3.0).max(off.x.abs() / 0.02).max(off.w.abs() / 0.5).max(1.0);
-            place.zoom += off.x / longest;
-            place.shift_px[0] += off.y / longest;
-            place.shift_px[1] += off.z / longest;
-            place.lens += off.w / longest;
-            let is_small = off.y.hypot(off.z) < SMALL_STEP_PX
-                && off.x.abs() < SMALL_STEP_ZOOM
-                && off.w.abs() < SMALL_STEP_LENS;
-            if is_small {
+            place = place.moved(&(step / longest(&step, &EDGE).max(1.0)));
+            if step_by_off.is_some() && longest(&step, &SMALL) < 1.0 {
                 break;
             }
         }
-        Some((place, normals))
+        Some(Converged { place, normals, step_by_off: step_by_off? })
     }
+
+    /// The normal equations at a place, and by how much they say that it is off, to be added to it.
+    fn off<const M: usize>(&self, place: &Place) -> Option<(Vec<Normal>, Vector4<f64>)> {
+        let frames: Vec<usize> = (0..self.textures.len()).collect();
+        let each = abreast(&frames, |&i| {
+            let spot = |pixel| (self.spot)(i, place, pixel);
+            Normal::new(self.print, (i, self.textures[i]), place, spot, self.lens)
+        });
+        let normals: Vec<Normal> = each.into_iter().flatten().collect();
+        let (information, score) = total(&normals);
+        let solved = solve::<M>(&information, &score)?;
+        Some((normals, place_of(&solved)))
+    }
+
+    /// How far to step for what the normal equations say that a place is off.
+    ///
+    /// Were the print in the depth maps exactly as blurred as the one it is compared with, it would be that far. Where it
+    /// is more so, the same change of what frames say moves the place farther, by half as much again in recordings:
+    /// found by moving it a little.
+    fn step_by_off<const M: usize>(
+        &self,
+        place: &Place,
+        off: &Vector4<f64>,
+    ) -> Option<Matrix4<f64>> {
+        let mut towards = Matrix4::identity();
+        for k in 0..M - 1 {
+            let mut step = Vector4::zeros();
+            step[k] = TRIED[k];
+            let (_, there) = self.off::<M>(&place.moved(&step))?;
+            towards.set_column(k, &((off - there) / TRIED[k]));
+        }
+        // Where the way is not towards the place, it is not near one.
+        let is_near = (0..M - 1).all(|k| towards[(k, k)] > LEAST_RESPONSE);
+        towards.try_inverse().filter(|_| is_near)
+    }
+}
+
+/// Where it is best.
+struct Converged {
+    place: Place,
+    normals: Vec<Normal>,
+    /// How far the place moves for what the normal equations say that it is off.
+    step_by_off: Matrix4<f64>,
+}
+
+/// Zoom, shift and, of five numbers, share of the other state; without contrast.
+fn place_of<const M: usize>(numbers: &SVector<f64, M>) -> Vector4<f64> {
+    Vector4::from_fn(|k, _| numbers.get(k + 1).copied().unwrap_or(0.0))
+}
+
+/// The longest of a step's parts, of those given.
+fn longest(step: &Vector4<f64>, parts: &[f64; 3]) -> f64 {
+    let [zoom, shift_px, lens] = parts;
+    (step.x / zoom).abs().max(step.y.hypot(step.z) / shift_px).max((step.w / lens).abs())
 }
 
 /// Finds contrast and place, starting from a place that is right within half a square. `look` tells where a pixel of
@@ -589,60 +649,96 @@ mod tests {
         Place { center: CENTER, zoom, shift_px, lens: 0.0 }
     }
 
-    /// A depth map with the print in it, that lies at this place; noise of 0.3 mm.
-    fn map(
-        board: &CharucoBoard,
-        (truth, contrast_m): (&Place, f64),
-        frame: usize,
-        noise: &mut Noise,
-    ) -> DepthMap {
-        let mut depth = |i: usize| {
-            let at = Pixel::new((i % 640) as f64, (i / 640) as f64);
-            let on = spot(frame, truth.looked_at(at)).on_board_m;
-            let dark = match board.is_white_at(Layout::Legacy, on.x, on.y) {
-                Some(false) => 0.5,
-                _ => -0.5,
-            };
-            (0.25 + contrast_m * dark + 0.0003 * noise.normal()) as f32
-        };
-        DepthMap::new(640, 480, (0..640 * 480).map(&mut depth).collect())
+    fn board() -> CharucoBoard {
+        let board = CharucoBoard::paper(0.020875).expect("a board");
+        CharucoBoard { layout: Some(Layout::Legacy), ..board }
     }
 
-    fn found(truth: &Place, contrast_m: f64) -> Option<Imprint> {
-        let mut board = CharucoBoard::paper(0.020875).expect("a board");
-        board.layout = Some(Layout::Legacy);
-        let mut noise = Noise(3);
-        let textures: Vec<Texture> = (0..6)
-            .map(|frame| {
-                let map = map(&board, (truth, contrast_m), frame, &mut noise);
-                Texture::new(&map, [0, 0], [640, 480])
-            })
-            .collect();
-        let textures: Vec<&Texture> = textures.iter().collect();
-        let look = |frame: usize, place: &Place, at| Some(spot(frame, place.looked_at(at)));
-        find(&Print::new(&board), place(1.0, [0.0; 2]), &textures, look, None)
-            .map(|seen| seen.imprint)
+    /// What is measured of a flat board.
+    struct Measured {
+        /// Where depth lies.
+        place: Place,
+        contrast_m: f64,
+        /// How widely the sensor blurs the print, metres on the board: a pixel is half a millimetre.
+        blur_m: f64,
+        noise_m: f64,
+    }
+
+    impl Measured {
+        /// What is found in so many frames.
+        fn found(&self, n_frames: usize, seed: u64) -> Option<Imprint> {
+            let print = Print::new(&board());
+            let level = print.level(self.blur_m);
+            let mut noise = Noise(seed);
+            let mut depth = |frame: usize, i: usize| {
+                let at = Pixel::new((i % 640) as f64, (i / 640) as f64);
+                let on = spot(frame, self.place.looked_at(at)).on_board_m;
+                let dark = print.at(level, &on).map_or(-0.5, |(dark, _)| dark);
+                (0.25 + self.contrast_m * dark + self.noise_m * noise.normal()) as f32
+            };
+            let textures: Vec<Texture> = (0..n_frames)
+                .map(|frame| {
+                    let depths = (0..640 * 480).map(|i| depth(frame, i)).collect();
+                    Texture::new(&DepthMap::new(640, 480, depths), [0, 0], [640, 480])
+                })
+                .collect();
+            let textures: Vec<&Texture> = textures.iter().collect();
+            let look = |frame: usize, place: &Place, at| Some(spot(frame, place.looked_at(at)));
+            find(&print, place(1.0, [0.0; 2]), &textures, look, None).map(|seen| seen.imprint)
+        }
     }
 
     /// From where it is looked for, six pixels at the board's rim.
     #[test]
     fn the_print_tells_zoom_and_shift() {
-        let truth = place(0.98, [2.4, -1.7]);
         for contrast_m in [0.0003, -0.0003] {
-            let seen = found(&truth, contrast_m).expect("stands out");
+            let measured = Measured {
+                place: place(0.98, [2.4, -1.7]),
+                contrast_m,
+                blur_m: 0.004,
+                noise_m: 0.0003,
+            };
+            let seen = measured.found(6, 3).expect("stands out");
             assert_eq!(seen.n_frames, 6);
             assert!((seen.zoom.value - 0.98).abs() < 5e-4, "{seen:?}");
-            for (axis, truth) in seen.shift_px.iter().zip(truth.shift_px) {
+            for (axis, truth) in seen.shift_px.iter().zip(measured.place.shift_px) {
                 assert!((axis.value - truth).abs() < 0.06, "{seen:?}");
-                assert!(axis.sigma < 0.3, "{seen:?}");
+                assert!(axis.sigma < 0.2, "{seen:?}");
             }
-            assert!(seen.contrast_m.value * contrast_m > 0.0, "{seen:?}");
+            // Of the blurs that the print is kept with, the nearest is taken: a step is 1.4.
+            assert!((seen.contrast_m.value / contrast_m - 1.0).abs() < 0.2, "{seen:?}");
+        }
+    }
+
+    /// A print more blurred than it is taken for, or less, under noise: errors against the σ that leaving out frames
+    /// tells.
+    #[test]
+    fn sigma_is_true_whatever_the_blur() {
+        const N: usize = 8;
+        let (zoom, shift_px) = (0.99, [1.2, -0.7]);
+        for blur_m in [0.002, 0.0065] {
+            let (mut squares, mut variances) = ([0.0; 3], [0.0; 3]);
+            for seed in 0..N {
+                let place = place(zoom, shift_px);
+                let measured = Measured { place, contrast_m: 0.0004, blur_m, noise_m: 0.001 };
+                let seen = measured.found(8, 40 + seed as u64).expect("stands out");
+                let [x, y] = [0, 1].map(|i| seen.shift_px[i].value - shift_px[i]);
+                for (k, off) in [seen.zoom.value - zoom, x, y].into_iter().enumerate() {
+                    squares[k] += off * off;
+                    variances[k] += seen.covariance[k][k] - NEIGHBOURHOOD_SIGMA[k].powi(2);
+                }
+            }
+            let ratio: f64 = (0..3).map(|k| squares[k] / variances[k] / 3.0).sum();
+            println!("{blur_m} m: errors² over σ² {ratio:.2}");
+            assert!((0.4..1.6).contains(&ratio), "{blur_m}: {ratio}");
         }
     }
 
     #[test]
     fn without_contrast_it_says_nothing() {
-        assert_eq!(found(&place(1.0, [0.0; 2]), 0.0), None);
+        let place = place(1.0, [0.0; 2]);
+        let nothing = Measured { place, contrast_m: 0.0, blur_m: 0.004, noise_m: 0.0003 };
+        assert_eq!(nothing.found(6, 3), None);
     }
 
     #[test]
