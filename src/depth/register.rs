@@ -133,9 +133,15 @@ const LEAST_FRAMES: usize = 3;
 const TUKEY: f64 = 4.685;
 /// Beyond this Mahalanobis distance a frame counts only linearly: 1 % of normal ones do (3 degrees of freedom).
 const FRAME_HUBER: f64 = 3.368;
+/// Beyond this it does not count at all: a single frame that is wrong by a hundred σ would make all others seem noisy.
+const FRAME_LOST: f64 = 10.0;
 /// The sensor's noise is alike within cells; a frame shows about so many of them. Only a start: how much the sensor
 /// adds to a plane's error is estimated.
 const NOISE_CELLS: f64 = 30.0;
+/// How far from that start it may be, beforehand: one standard deviation of the common logarithm of ρ.
+const RATIO_DECADES: f64 = 1.5;
+/// What is less likely than the likeliest by this does not count.
+const LEAST_SHARE: f64 = 1e-4;
 /// Noise of a patch relative to others, metres: σ² = floor² + (z²·growth)², after the published recordings.
 const NOISE_FLOOR_M: f64 = 0.17e-3;
 const NOISE_GROWTH_PER_M: f64 = 2.2e-3;
@@ -151,9 +157,9 @@ const NOISE_GROWTH_PER_M: f64 = 2.2e-3;
 /// βᵢ = Gᵢ·δθ + εᵢ,   cov εᵢ = κ²·(Σᵢ(pose) + ρ·Σᵢ(sensor))
 /// ```
 ///
-/// Σ(pose) follows from the corners' σ, Σ(sensor) has the shape that smooth noise of the sensor gives a plane; ρ and
-/// κ are found by restricted maximum likelihood, so that their sizes are what the frames scatter by. Residuals within
-/// a frame may be correlated in any way: they only count through β.
+/// Σ(pose) follows from the corners' σ, Σ(sensor) has the shape that smooth noise of the sensor gives a plane; κ is found
+/// by restricted maximum likelihood, so that their sizes are what the frames scatter by, and ρ is integrated out.
+/// Residuals within a frame may be correlated in any way: they only count through β.
 ///
 /// **The board's rim** is not where it is thought to be where the board is wavy: its heights are known at the corners,
 /// and a third of its surface lies beyond the outermost of them. That error is the same in all frames, and so neither
@@ -551,37 +557,60 @@ impl<const M: usize> Prior<M> {
     }
 }
 
+/// ρ, how much the sensor adds to what the poses are unsure by, is not known and often not well told: the likelihood
+/// may have two hills, poses alone and the sensor alone, with different answers. So all of them count as far as they
+/// are likely (ρ is integrated out), and their differences are part of σ.
 fn between_frames<const M: usize>(
     planes: &[Plane],
     gains: &Gains<M>,
     theta: &SVector<f64, M>,
     prior: &Prior<M>,
 ) -> Option<Step<M>> {
-    // How much the sensor adds to what the poses are unsure by: the ratio of greatest restricted likelihood.
-    let (ratio, _) = (-16..=16)
-        .map(|i| 10f64.powf(f64::from(i) / 4.0))
-        .filter_map(|ratio| Some((ratio, weigh(planes, gains, (theta, prior), ratio)?.likelihood)))
-        .fold((1.0, f64::NEG_INFINITY), |best, each| if each.1 > best.1 { each } else { best });
-    let Weighed { delta, information, parts, weights, .. } =
-        weigh(planes, gains, (theta, prior), ratio)?;
-    let inverse = Cholesky::new(information)?.inverse();
-    let all = Reduced { information: information.as_slice().to_vec(), score: vec![0.0; M] };
-    // Without it where a frame alone determines a number.
-    let clustered = Pooled::new(&all, &parts)?.clustered(M).unwrap_or_default();
-    let covariance = SMatrix::from_column_slice(&larger(inverse.as_slice(), &clustered));
-    let n_camera = planes.first().map_or(0, |p| p.by_camera.len());
-    let by_camera = (0..n_camera)
-        .map(|k| {
-            let mut score = SVector::<f64, M>::zeros();
-            for ((plane, gain), precision) in planes.iter().zip(gains).zip(&weights) {
-                score += gain.transpose() * (precision * plane.by_camera[k]);
-            }
-            -(inverse * score)
+    let tried: Vec<(f64, Weighed<M>)> = (-16..=16)
+        .filter_map(|i| {
+            let decades = f64::from(i) / 4.0;
+            let weighed = weigh(planes, gains, (theta, prior), 10f64.powf(decades))?;
+            let unlikely = 0.5 * (decades / RATIO_DECADES).powi(2);
+            Some((weighed.likelihood - unlikely, weighed))
         })
         .collect();
-    let moved = |part: &Reduced| inverse * SVector::<f64, M>::from_column_slice(&part.score);
-    let by_frame = planes.iter().map(|plane| plane.frame).zip(parts.iter().map(moved)).collect();
-    Some(Step { delta, covariance, by_frame, by_camera })
+    let most = tried.iter().map(|(ln, _)| *ln).fold(f64::NEG_INFINITY, f64::max);
+    let likely: Vec<(f64, &Weighed<M>)> = tried
+        .iter()
+        .map(|(ln, weighed)| ((ln - most).exp(), weighed))
+        .filter(|(share, _)| *share > LEAST_SHARE)
+        .collect();
+    let whole: f64 = likely.iter().map(|(share, _)| share).sum();
+    let likely = likely.into_iter().map(|(share, weighed)| (share / whole, weighed));
+
+    let n_camera = planes.first().map_or(0, |p| p.by_camera.len());
+    let mut step = Step {
+        delta: likely.clone().map(|(share, weighed)| weighed.delta * share).sum(),
+        covariance: SMatrix::zeros(),
+        by_frame: planes.iter().map(|plane| (plane.frame, SVector::zeros())).collect(),
+        by_camera: vec![SVector::zeros(); n_camera],
+    };
+    for (share, Weighed { delta, information, parts, weights, .. }) in likely {
+        let inverse = Cholesky::new(*information)?.inverse();
+        let all = Reduced { information: information.as_slice().to_vec(), score: vec![0.0; M] };
+        // Without it where a frame alone determines a number.
+        let clustered = Pooled::new(&all, parts)?.clustered(M).unwrap_or_default();
+        let covariance =
+            SMatrix::<f64, M, M>::from_column_slice(&larger(inverse.as_slice(), &clustered));
+        let apart = delta - step.delta;
+        step.covariance += (covariance + apart * apart.transpose()) * share;
+        for (k, sum) in step.by_camera.iter_mut().enumerate() {
+            let mut score = SVector::<f64, M>::zeros();
+            for ((plane, gain), precision) in planes.iter().zip(gains).zip(weights) {
+                score += gain.transpose() * (precision * plane.by_camera[k]);
+            }
+            *sum -= inverse * score * share;
+        }
+        for ((_, sum), part) in step.by_frame.iter_mut().zip(parts) {
+            *sum += inverse * SVector::<f64, M>::from_column_slice(&part.score) * share;
+        }
+    }
+    Some(step)
 }
 
 struct Weighed<const M: usize> {
@@ -622,6 +651,7 @@ fn weigh<const M: usize>(
     let mut delta = SVector::<f64, M>::zeros();
     let mut variance = 1.0;
     let mut information = SMatrix::<f64, M, M>::zeros();
+    let mut beyond = 0.0;
     for _ in 0..15 {
         information = prior.precision;
         let mut score = prior.precision * (prior.mean - theta);
@@ -642,18 +672,24 @@ fn weigh<const M: usize>(
             .collect();
         // What was known beforehand costs no freedom.
         let n_found = M as f64 - factor.solve(&prior.precision).trace();
+        let n_counted = 3.0 * robust.iter().filter(|w| **w > 0.0).count() as f64;
         variance = squares.iter().zip(&robust).map(|(s, w)| s * w).sum::<f64>()
-            / (n_numbers - n_found).max(1.0);
+            / (n_counted - n_found).max(1.0);
+        beyond = 0.0;
         for (w, s) in robust.iter_mut().zip(&squares) {
-            *w = (FRAME_HUBER / (s / variance).sqrt()).min(1.0);
+            let distance = (s / variance).sqrt();
+            *w = if distance > FRAME_LOST { 0.0 } else { (FRAME_HUBER / distance).min(1.0) };
+            beyond += FRAME_HUBER * (distance.min(FRAME_LOST) - FRAME_HUBER).max(0.0);
         }
     }
     let n_found = M as f64 - Cholesky::new(information)?.solve(&prior.precision).trace();
     let root = Cholesky::new(prior.covariance)?.unpack();
     let ln_scaled = Cholesky::new(root.transpose() * information * root)?.ln_determinant();
     let off = theta + delta - prior.mean;
+    // Frames that count less, or not at all, are not for nothing: the loss is the sum of weighted squares and what lies
+    // beyond.
     let likelihood = -0.5
-        * (determinants + n_numbers * variance.ln() + ln_scaled - n_found
+        * (determinants + n_numbers * variance.ln() + beyond + ln_scaled - n_found
             + off.dot(&(prior.precision * off)));
     let shares = said.iter().zip(&robust).map(|(said, w)| (said, w / variance));
     let weights = shares.clone().map(|(said, share)| said.inverse * share).collect();

@@ -142,10 +142,14 @@ pub(super) fn check(case: &Case<'_>, measured: Option<&Measured>) -> Finding {
             )
         }
     };
-    let spread = if measured.origin == Origin::Given {
-        String::new()
+    // A σ that two decimals would call nothing has three.
+    let decimals = if percent_sigma < 0.01 { 3 } else { 2 };
+    let (decimals, spread) = if measured.origin == Origin::Given {
+        (2, String::new())
+    } else if percent_sigma < 5e-4 {
+        (decimals, " +- less than 0.001".to_owned())
     } else {
-        format!(" +- {percent_sigma:.2}")
+        (decimals, format!(" +- {percent_sigma:.decimals$}"))
     };
     let words = match finding.verdict {
         Verdict::Fault => "The factory's focal length is wrong",
@@ -156,7 +160,7 @@ pub(super) fn check(case: &Case<'_>, measured: Option<&Measured>) -> Finding {
         }
     };
     finding.summary = format!(
-        "{words}: {focal_px:.2} px instead of {factory_px:.2} px, {percent:+.2}{spread} % ({how}; tolerance {:.1} %).",
+        "{words}: {focal_px:.2} px instead of {factory_px:.2} px, {percent:+.decimals$}{spread} % ({how}; tolerance {:.1} %).",
         100.0 * case.tolerances.focal
     );
     match finding.verdict {

@@ -5,6 +5,7 @@ use truedepth::{
     calibrate::{Estimate, MAX_VIEWS},
     depth::{patches, temporal_noise},
     diagnose::{Code, Verdict},
+    image::DepthMap,
     simulate::{Device, Faults, Plan, Stream},
 };
 
@@ -16,6 +17,16 @@ fn judged_from(device: &str, seed: u64, faults: &[&str], max_views: usize) -> (P
     let mut plan = Plan::new(Device::named(device).expect("is known"), seed);
     plan.faults = Faults::parse(faults.iter().copied()).expect("can be");
     plan.n_frames = 15;
+    let audit = audit_with(&plan, max_views, |_, depth| Some(depth));
+    (plan, audit)
+}
+
+/// What is found where depth maps are what `depth` makes of them.
+fn audit_with(
+    plan: &Plan,
+    max_views: usize,
+    depth: impl Fn(usize, DepthMap) -> Option<DepthMap>,
+) -> Audit {
     let factory = plan.factory();
     let seen = (0..plan.n_frames).map(|frame| {
         let glimpse = plan.glimpse(frame);
@@ -23,13 +34,12 @@ fn judged_from(device: &str, seed: u64, faults: &[&str], max_views: usize) -> (P
             t_ns: 500_000_000 * frame as i64,
             size_px: [640, 480],
             observation: glimpse.observation,
-            depth: Some(glimpse.depth),
+            depth: depth(frame, glimpse.depth),
         }
     });
     let board = Some(plan.board.clone());
     let options = Options { board, max_views, ..Options::new(Method::Auto) };
-    let audit = audit_seen("simulated", Some(&factory), seen.collect(), &options).expect("audits");
-    (plan, audit)
+    audit_seen("simulated", Some(&factory), seen.collect(), &options).expect("audits")
 }
 
 fn faults(audit: &Audit) -> Vec<Code> {
@@ -68,6 +78,33 @@ fn sigmas_and_verdicts_of_sound_recordings() {
     let names = ["focal", "scale", "bias", "zoom", "shift x", "shift y"];
     for (name, mean) in names.iter().zip(squares) {
         assert!((0.18..2.8).contains(&mean), "{name}: {squares:?}");
+    }
+}
+
+/// A depth map that belongs to another moment takes nothing from what all others say: as if there were none.
+#[test]
+fn one_wrong_depth_map_does_not_count() {
+    let mut plan = Plan::new(Device::named("ipad-12.9-5gen").expect("is known"), 71);
+    plan.n_frames = 15;
+    let wrong = |map: DepthMap| {
+        let twisted = |i: usize| map.depth_m()[i] * (1.1 + 3e-4 * (i % 640) as f32);
+        DepthMap::new(640, 480, (0..640 * 480).map(twisted).collect())
+    };
+    let of = |depth: &dyn Fn(DepthMap) -> Option<DepthMap>| {
+        let found = audit_with(
+            &plan,
+            MAX_VIEWS,
+            |frame, map| {
+                if frame == 4 { depth(map) } else { Some(map) }
+            },
+        );
+        found.registration.expect("registers").slopes
+    };
+    let (without, with) = (of(&|_| None), of(&|map| Some(wrong(map))));
+    let [[x, y], [also_x, also_y]] = [without.shift_px, with.shift_px];
+    for (one, other) in [(without.zoom, with.zoom), (x, also_x), (y, also_y)] {
+        assert!((one.value - other.value).abs() < 0.5 * one.sigma, "{without:?} {with:?}");
+        assert!((other.sigma / one.sigma - 1.0).abs() < 0.2, "{without:?} {with:?}");
     }
 }
 

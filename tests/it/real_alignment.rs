@@ -38,13 +38,13 @@ fn av_foundation_is_aligned() {
         assert!(found.zoom.sigma < 0.004, "{name}: {:?}", found.zoom);
         // Two witnesses that share nothing but the poses.
         let print = found.imprint.as_ref().expect("stands out in all three");
-        assert!((5e-5..3e-4).contains(&print.contrast_m.value), "{name}: {print:?}");
+        assert!((1.5e-4..4e-4).contains(&print.contrast_m.value), "{name}: {print:?}");
         let apart = found.disagreement.expect("two witnesses");
         assert!(apart < 2.6, "{name}: {apart}"); // 5 % of right σ are beyond.
         let verdict = |code: Code| {
             audit.findings.iter().find(|f| f.code == code).expect("is checked").verdict
         };
-        // The 5th generation's frames are few and blurred: 0.994 ± 0.0025 leaves open whether 1 % is exceeded.
+        // The 5th generation's frames are few and blurred: 0.994 ± 0.003 leaves open whether 1 % is exceeded.
         let known = if name.contains("5gen") { Verdict::Unknown } else { Verdict::Ok };
         assert_eq!(verdict(Code::TD401), known, "{name}");
         assert_ne!(verdict(Code::TD403), Verdict::Fault, "{name}");
@@ -93,7 +93,8 @@ fn moved(recording: &Recording, from: impl Fn(Pixel) -> Option<Pixel>) -> Record
 
 /// Every second frame against the others: each half calibrates for itself. With ten frames to a half an honest σ²
 /// still scatters, and the mean square of errors over σ is ν/(ν−2), 1.3 for eight degrees of freedom; nine of these
-/// are below 4.1 on average in 99.9 % of cases.
+/// are below 4.1 on average in 99.9 % of cases. (Of 40 random halves of each recording the mean is 1.4, and the mean
+/// square of errors over that of σ 1.1.)
 #[test]
 fn halves_agree() {
     let mut squares = Vec::new();
