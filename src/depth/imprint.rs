@@ -545,8 +545,8 @@ impl Looks<'_> {
 
     /// How far to step for what the normal equations say that a place is off.
     ///
-    /// Were the print in the depth maps exactly as blurred as the one it is compared with, it would be that far. Where it
-    /// is more so, the same change of what frames say moves the place farther, by half as much again in recordings:
+    /// Were the print in the depth maps exactly as blurred as the one it is compared with, it would be that far. Where
+    /// it is more so, the same change of what frames say moves the place farther, by half as much again in recordings:
     /// found by moving it a little.
     fn step_by_off<const M: usize>(
         &self,

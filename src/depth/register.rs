@@ -157,8 +157,8 @@ const NOISE_GROWTH_PER_M: f64 = 2.2e-3;
 /// βᵢ = Gᵢ·δθ + εᵢ,   cov εᵢ = κ²·(Σᵢ(pose) + ρ·Σᵢ(sensor))
 /// ```
 ///
-/// Σ(pose) follows from the corners' σ, Σ(sensor) has the shape that smooth noise of the sensor gives a plane; κ is found
-/// by restricted maximum likelihood, so that their sizes are what the frames scatter by, and ρ is integrated out.
+/// Σ(pose) follows from the corners' σ, Σ(sensor) has the shape that smooth noise of the sensor gives a plane; κ is
+/// found by restricted maximum likelihood, so that their sizes are what the frames scatter by, and ρ is integrated out.
 /// Residuals within a frame may be correlated in any way: they only count through β.
 ///
 /// **The board's rim** is not where it is thought to be where the board is wavy: its heights are known at the corners,
