@@ -160,7 +160,8 @@ pub(super) fn check(case: &Case<'_>, measured: Option<&Measured>) -> Finding {
         }
     };
     finding.summary = format!(
-        "{words}: {focal_px:.2} px instead of {factory_px:.2} px, {percent:+.decimals$}{spread} % ({how}; tolerance {:.1} %).",
+        "{words}: {focal_px:.2} px instead of {factory_px:.2} px, {percent:+.decimals$}{spread} % ({how}; \
+         tolerance {:.1} %).",
         100.0 * case.tolerances.focal
     );
     match finding.verdict {
