@@ -38,6 +38,7 @@
 //! Not here: verdicts ([`diagnose`](crate::diagnose)), images other than depth maps.
 
 mod against_board;
+mod between;
 mod handedness;
 mod imprint;
 mod join;

@@ -1,9 +1,10 @@
 //! Depth against colour, all views at once: scale, bias, zoom and shift of the sensor.
 
-use nalgebra::{Cholesky, Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
 
 use super::{
     Patch, Patches,
+    between::{BIAS, N, Plane, Prior, SCALE, SHIFT, Step, ZOOM, between_frames},
     imprint::{self, Imprint, Place, Print, Spot, Texture},
     join::{Joined, Seen, join},
     pattern::{Holes, MAX_INCIDENCE_DEG, NEAR_M, Pattern, Residual},
@@ -17,7 +18,7 @@ use crate::{
     camera::Camera,
     geom::Pixel,
     pose::View,
-    solve::{Pooled, Reduced, larger, mad_sigma},
+    solve::mad_sigma,
 };
 
 /// How the depth sensor stands to the colour camera and to the truth, from the board's whole surface in all views.
@@ -111,37 +112,18 @@ pub struct RegisterInput<'a> {
 /// See [`RegisterInput::other_state`].
 pub type OtherState<'a> = dyn Fn(Pixel) -> Option<Pixel> + Sync + 'a;
 
-/// The unknowns: the plane by which the board's surface is not where its corners say (height of its middle, slopes
-/// along its rows and columns), then the five of [`Registration`]; the share of the other distortion state comes after
-/// these, where it is asked for.
-const N: usize = 8;
-const SCALE: usize = 3;
-const BIAS: usize = 4;
-const ZOOM: usize = 5;
-const SHIFT: [usize; 2] = [6, 7];
 type Numbers = SVector<f64, N>;
 type Square = SMatrix<f64, N, N>;
 
-/// Scale, bias (m), zoom, shift (px) and share that no recording is farther from the truth than by about this: keeps
-/// what the views do not determine from running away. Weak beside any recording that tells anything.
-const PRIOR_SIGMA: [f64; 6] = [0.3, 0.1, 0.3, 60.0, 60.0, 3.0];
 /// Frames below this number of patches say nothing about a plane.
 const LEAST_PATCHES: usize = 12;
 /// Frames below this number do not even disagree.
 const LEAST_FRAMES: usize = 3;
 /// Tukey's biweight keeps 95 % efficiency under normal noise with this multiple of the standard deviation.
 const TUKEY: f64 = 4.685;
-/// Beyond this Mahalanobis distance a frame counts only linearly: 1 % of normal ones do (3 degrees of freedom).
-const FRAME_HUBER: f64 = 3.368;
-/// Beyond this it does not count at all: a single frame that is wrong by a hundred σ would make all others seem noisy.
-const FRAME_LOST: f64 = 10.0;
 /// The sensor's noise is alike within cells; a frame shows about so many of them. Only a start: how much the sensor
 /// adds to a plane's error is estimated.
 const NOISE_CELLS: f64 = 30.0;
-/// How far from that start it may be, beforehand: one standard deviation of the common logarithm of ρ.
-const RATIO_DECADES: f64 = 1.5;
-/// What is less likely than the likeliest by this does not count.
-const LEAST_SHARE: f64 = 1e-4;
 /// Noise of a patch relative to others, metres: σ² = floor² + (z²·growth)², after the published recordings.
 const NOISE_FLOOR_M: f64 = 0.17e-3;
 const NOISE_GROWTH_PER_M: f64 = 2.2e-3;
@@ -281,25 +263,6 @@ struct Sight {
     by_theta: Numbers,
     /// By the share of the other distortion state.
     by_lens: f64,
-}
-
-/// What one frame says.
-pub(super) struct Plane {
-    /// Index of the frame in the recording.
-    frame: usize,
-    /// By which plane the sensor differs from the model.
-    beta: Vector3<f64>,
-    /// By the unknowns.
-    gain: SMatrix<f64, 3, N>,
-    /// By the share of the other distortion state.
-    by_lens: Vector3<f64>,
-    /// By one σ of each of the camera's numbers.
-    by_camera: Vec<Vector3<f64>>,
-    pose: Matrix3<f64>,
-    sensor: Matrix3<f64>,
-    n_patches: usize,
-    /// Sum, smallest and largest depth of the board.
-    board_m: [f64; 3],
 }
 
 impl Scene<'_> {
@@ -518,188 +481,6 @@ impl Scene<'_> {
 /// σ of a patch, up to a factor that does not matter.
 fn noise_m(board_m: f64) -> f64 {
     NOISE_FLOOR_M.hypot(board_m * board_m * NOISE_GROWTH_PER_M)
-}
-
-/// The second level, for M unknowns: all but the share of the other distortion state, or with it.
-struct Step<const M: usize> {
-    delta: SVector<f64, M>,
-    covariance: SMatrix<f64, M, M>,
-    /// By how much each frame (index in the recording) moves them.
-    by_frame: Vec<(usize, SVector<f64, M>)>,
-    /// What one σ of each of the camera's numbers does to them.
-    by_camera: Vec<SVector<f64, M>>,
-}
-
-/// What each of the unknowns does to each frame's plane.
-type Gains<const M: usize> = [SMatrix<f64, 3, M>];
-
-/// What is known of the unknowns before anything was measured.
-struct Prior<const M: usize> {
-    mean: SVector<f64, M>,
-    covariance: SMatrix<f64, M, M>,
-    precision: SMatrix<f64, M, M>,
-}
-
-impl<const M: usize> Prior<M> {
-    fn new(of_board: Matrix3<f64>) -> Self {
-        let mut mean = SVector::zeros();
-        (mean[SCALE], mean[ZOOM]) = (1.0, 1.0);
-        let sigma = |k: usize| PRIOR_SIGMA[k.saturating_sub(SCALE)];
-        let mut covariance =
-            SMatrix::<f64, M, M>::from_diagonal(&SVector::from_fn(|k, _| sigma(k).powi(2)));
-        covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&of_board);
-        let precision = covariance.try_inverse().expect("a covariance");
-        Self { mean, covariance, precision }
-    }
-
-    fn sigma(&self) -> SVector<f64, M> {
-        self.covariance.diagonal().map(f64::sqrt)
-    }
-}
-
-/// ρ, how much the sensor adds to what the poses are unsure by, is not known and often not well told: the likelihood
-/// may have two hills, poses alone and the sensor alone, with different answers. So all of them count as far as they
-/// are likely (ρ is integrated out), and their differences are part of σ.
-fn between_frames<const M: usize>(
-    planes: &[Plane],
-    gains: &Gains<M>,
-    theta: &SVector<f64, M>,
-    prior: &Prior<M>,
-) -> Option<Step<M>> {
-    let tried: Vec<(f64, Weighed<M>)> = (-16..=16)
-        .filter_map(|i| {
-            let decades = f64::from(i) / 4.0;
-            let weighed = weigh(planes, gains, (theta, prior), 10f64.powf(decades))?;
-            let unlikely = 0.5 * (decades / RATIO_DECADES).powi(2);
-            Some((weighed.likelihood - unlikely, weighed))
-        })
-        .collect();
-    let most = tried.iter().map(|(ln, _)| *ln).fold(f64::NEG_INFINITY, f64::max);
-    let likely: Vec<(f64, &Weighed<M>)> = tried
-        .iter()
-        .map(|(ln, weighed)| ((ln - most).exp(), weighed))
-        .filter(|(share, _)| *share > LEAST_SHARE)
-        .collect();
-    let whole: f64 = likely.iter().map(|(share, _)| share).sum();
-    let likely = likely.into_iter().map(|(share, weighed)| (share / whole, weighed));
-
-    let n_camera = planes.first().map_or(0, |p| p.by_camera.len());
-    let mut step = Step {
-        delta: likely.clone().map(|(share, weighed)| weighed.delta * share).sum(),
-        covariance: SMatrix::zeros(),
-        by_frame: planes.iter().map(|plane| (plane.frame, SVector::zeros())).collect(),
-        by_camera: vec![SVector::zeros(); n_camera],
-    };
-    for (share, Weighed { delta, information, parts, weights, .. }) in likely {
-        let inverse = Cholesky::new(*information)?.inverse();
-        let all = Reduced { information: information.as_slice().to_vec(), score: vec![0.0; M] };
-        // Without it where a frame alone determines a number.
-        let clustered = Pooled::new(&all, parts)?.clustered(M).unwrap_or_default();
-        let covariance =
-            SMatrix::<f64, M, M>::from_column_slice(&larger(inverse.as_slice(), &clustered));
-        let apart = delta - step.delta;
-        step.covariance += (covariance + apart * apart.transpose()) * share;
-        for (k, sum) in step.by_camera.iter_mut().enumerate() {
-            let mut score = SVector::<f64, M>::zeros();
-            for ((plane, gain), precision) in planes.iter().zip(gains).zip(weights) {
-                score += gain.transpose() * (precision * plane.by_camera[k]);
-            }
-            *sum -= inverse * score * share;
-        }
-        for ((_, sum), part) in step.by_frame.iter_mut().zip(parts) {
-            *sum += inverse * SVector::<f64, M>::from_column_slice(&part.score) * share;
-        }
-    }
-    Some(step)
-}
-
-struct Weighed<const M: usize> {
-    delta: SVector<f64, M>,
-    information: SMatrix<f64, M, M>,
-    /// What each frame alone says: its information, and what it still asks for.
-    parts: Vec<Reduced>,
-    /// The precision of each frame's plane.
-    weights: Vec<Matrix3<f64>>,
-    likelihood: f64,
-}
-
-fn weigh<const M: usize>(
-    planes: &[Plane],
-    gains: &Gains<M>,
-    (theta, prior): (&SVector<f64, M>, &Prior<M>),
-    ratio: f64,
-) -> Option<Weighed<M>> {
-    struct Said<const M: usize> {
-        inverse: Matrix3<f64>,
-        information: SMatrix<f64, M, M>,
-        score: SVector<f64, M>,
-    }
-    let mut determinants = 0.0;
-    let said: Vec<Said<M>> = planes
-        .iter()
-        .zip(gains)
-        .map(|(plane, gain)| {
-            let covariance = plane.pose + plane.sensor * ratio;
-            let inverse = covariance.try_inverse()?;
-            determinants += covariance.determinant().ln();
-            let weighted = gain.transpose() * inverse;
-            Some(Said { inverse, information: weighted * gain, score: weighted * plane.beta })
-        })
-        .collect::<Option<_>>()?;
-    let n_numbers = (3 * planes.len()) as f64;
-    let mut robust = vec![1.0; planes.len()];
-    let mut delta = SVector::<f64, M>::zeros();
-    let mut variance = 1.0;
-    let mut information = SMatrix::<f64, M, M>::zeros();
-    let mut beyond = 0.0;
-    for _ in 0..15 {
-        information = prior.precision;
-        let mut score = prior.precision * (prior.mean - theta);
-        for (said, w) in said.iter().zip(&robust) {
-            information += said.information * (w / variance);
-            score += said.score * (w / variance);
-        }
-        let factor = Cholesky::new(information)?;
-        delta = factor.solve(&score);
-        let squares: Vec<f64> = planes
-            .iter()
-            .zip(gains)
-            .zip(&said)
-            .map(|((plane, gain), said)| {
-                let e = plane.beta - gain * delta;
-                e.dot(&(said.inverse * e))
-            })
-            .collect();
-        // What was known beforehand costs no freedom.
-        let n_found = M as f64 - factor.solve(&prior.precision).trace();
-        let n_counted = 3.0 * robust.iter().filter(|w| **w > 0.0).count() as f64;
-        variance = squares.iter().zip(&robust).map(|(s, w)| s * w).sum::<f64>()
-            / (n_counted - n_found).max(1.0);
-        beyond = 0.0;
-        for (w, s) in robust.iter_mut().zip(&squares) {
-            let distance = (s / variance).sqrt();
-            *w = if distance > FRAME_LOST { 0.0 } else { (FRAME_HUBER / distance).min(1.0) };
-            beyond += FRAME_HUBER * (distance.min(FRAME_LOST) - FRAME_HUBER).max(0.0);
-        }
-    }
-    let n_found = M as f64 - Cholesky::new(information)?.solve(&prior.precision).trace();
-    let root = Cholesky::new(prior.covariance)?.unpack();
-    let ln_scaled = Cholesky::new(root.transpose() * information * root)?.ln_determinant();
-    let off = theta + delta - prior.mean;
-    // Frames that count less, or not at all, are not for nothing: the loss is the sum of weighted squares and what lies
-    // beyond.
-    let likelihood = -0.5
-        * (determinants + n_numbers * variance.ln() + beyond + ln_scaled - n_found
-            + off.dot(&(prior.precision * off)));
-    let shares = said.iter().zip(&robust).map(|(said, w)| (said, w / variance));
-    let weights = shares.clone().map(|(said, share)| said.inverse * share).collect();
-    let parts = shares
-        .map(|(said, share)| Reduced {
-            information: (said.information * share).as_slice().to_vec(),
-            score: ((said.score - said.information * delta) * share).as_slice().to_vec(),
-        })
-        .collect();
-    Some(Weighed { delta, information, parts, weights, likelihood })
 }
 
 /// Adds what the camera's own covariance does.
