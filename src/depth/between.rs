@@ -5,8 +5,8 @@ use nalgebra::{Cholesky, Matrix3, SMatrix, SVector, Vector3};
 use crate::solve::{Pooled, Reduced, larger};
 
 /// The unknowns: the plane by which the board's surface is not where its corners say (height of its middle, slopes
-/// along its rows and columns), then the five of [`Registration`](super::Registration); the share of the other distortion state comes after
-/// these, where it is asked for.
+/// along its rows and columns), then the five of [`Registration`](super::Registration); the share of the other
+/// distortion state comes after these, where it is asked for.
 pub(super) const N: usize = 8;
 pub(super) const SCALE: usize = 3;
 pub(super) const BIAS: usize = 4;
