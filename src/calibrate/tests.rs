@@ -486,7 +486,6 @@ fn knows_the_shape_of_a_board_seen_in_motion() {
         }
         sigma_m += mean(&surface.sigmas_m) / N as f64;
     }
-    println!("z² {squares:.2}, σ {:.1} µm", 1e6 * sigma_m);
     assert!((0.5..1.6).contains(&squares), "{squares}");
     assert!(sigma_m < 3e-5, "{sigma_m}");
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{Cholesky, Matrix3, SMatrix, SVector, Vector3};
 
-use crate::solve::{Pooled, Reduced, larger};
+use crate::solve::{Pooled, Reduced, larger, median};
 
 /// The unknowns: the plane by which the board's surface is not where its corners say (height of its middle, slopes
 /// along its rows and columns), then the five of [`Registration`](super::Registration); the share of the other
@@ -20,6 +20,9 @@ const PRIOR_SIGMA: [f64; 6] = [0.3, 0.1, 0.3, 60.0, 60.0, 3.0];
 const FRAME_HUBER: f64 = 3.368;
 /// Beyond this it does not count at all: a single frame that is wrong by a hundred σ would make all others seem noisy.
 const FRAME_LOST: f64 = 10.0;
+/// So many of 15 rounds take the variance from the median of the squares, χ² over three degrees of freedom.
+const ROUNDS_BY_MEDIAN: usize = 6;
+const MEDIAN_CHI2: f64 = 2.366;
 /// How far ρ may be from its start, beforehand: one standard deviation of the common logarithm of ρ.
 const RATIO_DECADES: f64 = 1.5;
 /// What is less likely than the likeliest by this does not count.
@@ -176,7 +179,7 @@ fn weigh<const M: usize>(
     let mut variance = 1.0;
     let mut information = SMatrix::<f64, M, M>::zeros();
     let mut beyond = 0.0;
-    for _ in 0..15 {
+    for round in 0..15 {
         information = prior.precision;
         let mut score = prior.precision * (prior.mean - theta);
         for (said, w) in said.iter().zip(&robust) {
@@ -197,8 +200,13 @@ fn weigh<const M: usize>(
         // What was known beforehand costs no freedom.
         let n_found = M as f64 - factor.solve(&prior.precision).trace();
         let n_counted = 3.0 * robust.iter().filter(|w| **w > 0.0).count() as f64;
-        variance = squares.iter().zip(&robust).map(|(s, w)| s * w).sum::<f64>()
-            / (n_counted - n_found).max(1.0);
+        // A frame that is wrong by far hides in a mean that it makes itself; in the median it cannot.
+        variance = if round < ROUNDS_BY_MEDIAN {
+            (median(&squares) / MEDIAN_CHI2).max(f64::MIN_POSITIVE)
+        } else {
+            squares.iter().zip(&robust).map(|(s, w)| s * w).sum::<f64>()
+                / (n_counted - n_found).max(1.0)
+        };
         beyond = 0.0;
         for (w, s) in robust.iter_mut().zip(&squares) {
             let distance = (s / variance).sqrt();
