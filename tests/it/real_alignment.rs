@@ -93,8 +93,8 @@ fn moved(recording: &Recording, from: impl Fn(Pixel) -> Option<Pixel>) -> Record
 
 /// Every second frame against the others: each half calibrates for itself. With ten frames to a half an honest σ²
 /// still scatters, and the mean square of errors over σ is ν/(ν−2), 1.3 for eight degrees of freedom; nine of these
-/// are below 4.1 on average in 99.9 % of cases. (Of 40 random halves of each recording the mean is 1.4, and the mean
-/// square of errors over that of σ 1.1.)
+/// are below 4.1 on average in 99.9 % of cases. (Of 40 random halves of each recording the mean is 1.5, and the mean
+/// square of errors over that of σ 1.2.)
 #[test]
 fn halves_agree() {
     let mut squares = Vec::new();
