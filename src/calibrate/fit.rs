@@ -178,11 +178,14 @@ fn fit_sized<const S: usize>(shape: Shape<'_>, data: &Data<'_>, start: Start<'_>
         .filter(|pooled| reducible && is_determined(pooled, &diagonal, n));
     // Heights from a plane that no picture tells from the poses are as unsure as beforehand, all of them alike, and
     // what makes the residuals of a picture alike is lost in that: heights from the board's own plane are asked for.
-    let mut sums = units(n);
-    match data.wanted {
-        Wanted::Everything => data.sheet.take_planes_out(shape.surface, &mut sums),
-        Wanted::Camera => sums.truncate(S),
-    }
+    let sums = match data.wanted {
+        Wanted::Camera => units(S, n),
+        Wanted::Everything => {
+            let mut sums = units(n, n);
+            data.sheet.take_planes_out(shape.surface, &mut sums);
+            sums
+        }
+    };
     let covariance = pooled.as_ref().map(|pooled| {
         let mut classical: Vec<f64> = pooled.classical().iter().map(|c| variance * c).collect();
         if data.wanted == Wanted::Everything {

@@ -117,19 +117,21 @@ pub(super) fn between_frames<const M: usize>(
         by_frame: planes.iter().map(|plane| (plane.frame, SVector::zeros())).collect(),
         by_camera: vec![SVector::zeros(); n_camera],
     };
-    for (share, Weighed { delta, information, parts, weights, .. }) in likely {
-        let inverse = Cholesky::new(*information)?.inverse();
+    for (share, weighed) in likely {
+        let (delta, information) = (weighed.delta, weighed.information);
+        let inverse = Cholesky::new(information)?.inverse();
         let all = Reduced { information: information.as_slice().to_vec(), score: vec![0.0; M] };
+        let parts = weighed.parts();
         // Without it where a frame alone determines a number.
-        let clustered = Pooled::new(&all, parts)?.clustered(M).unwrap_or_default();
+        let clustered = Pooled::new(&all, &parts)?.clustered(M).unwrap_or_default();
         let covariance =
             SMatrix::<f64, M, M>::from_column_slice(&larger(inverse.as_slice(), &clustered));
         let apart = delta - step.delta;
         step.covariance += (covariance + apart * apart.transpose()) * share;
         for (k, sum) in step.by_camera.iter_mut().enumerate() {
             let mut score = SVector::<f64, M>::zeros();
-            for ((plane, gain), precision) in planes.iter().zip(gains).zip(weights) {
-                score += gain.transpose() * (precision * plane.by_camera[k]);
+            for ((plane, gain), (said, w)) in planes.iter().zip(gains).zip(&weighed.said) {
+                score += gain.transpose() * (said.inverse * plane.by_camera[k]) * *w;
             }
             *sum -= inverse * score * share;
         }
@@ -143,11 +145,27 @@ pub(super) fn between_frames<const M: usize>(
 struct Weighed<const M: usize> {
     delta: SVector<f64, M>,
     information: SMatrix<f64, M, M>,
-    /// What each frame alone says: its information, and what it still asks for.
-    parts: Vec<Reduced>,
-    /// The precision of each frame's plane.
-    weights: Vec<Matrix3<f64>>,
+    /// What each frame says, and as how much it counts.
+    said: Vec<(Said<M>, f64)>,
     likelihood: f64,
+}
+
+impl<const M: usize> Weighed<M> {
+    /// What each frame alone says: its information, and what it still asks for.
+    fn parts(&self) -> Vec<Reduced> {
+        let part = |(said, w): &(Said<M>, f64)| Reduced {
+            information: (said.information * *w).as_slice().to_vec(),
+            score: ((said.score - said.information * self.delta) * *w).as_slice().to_vec(),
+        };
+        self.said.iter().map(part).collect()
+    }
+}
+
+struct Said<const M: usize> {
+    /// The precision of the frame's plane.
+    inverse: Matrix3<f64>,
+    information: SMatrix<f64, M, M>,
+    score: SVector<f64, M>,
 }
 
 fn weigh<const M: usize>(
@@ -156,11 +174,6 @@ fn weigh<const M: usize>(
     (theta, prior): (&SVector<f64, M>, &Prior<M>),
     ratio: f64,
 ) -> Option<Weighed<M>> {
-    struct Said<const M: usize> {
-        inverse: Matrix3<f64>,
-        information: SMatrix<f64, M, M>,
-        score: SVector<f64, M>,
-    }
     let mut determinants = 0.0;
     let said: Vec<Said<M>> = planes
         .iter()
@@ -223,13 +236,6 @@ fn weigh<const M: usize>(
     let likelihood = -0.5
         * (determinants + n_numbers * variance.ln() + beyond + ln_scaled - n_found
             + off.dot(&(prior.precision * off)));
-    let shares = said.iter().zip(&robust).map(|(said, w)| (said, w / variance));
-    let weights = shares.clone().map(|(said, share)| said.inverse * share).collect();
-    let parts = shares
-        .map(|(said, share)| Reduced {
-            information: (said.information * share).as_slice().to_vec(),
-            score: ((said.score - said.information * delta) * share).as_slice().to_vec(),
-        })
-        .collect();
-    Some(Weighed { delta, information, parts, weights, likelihood })
+    let said = said.into_iter().zip(robust).map(|(said, w)| (said, w / variance)).collect();
+    Some(Weighed { delta, information, said, likelihood })
 }

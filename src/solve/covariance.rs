@@ -40,7 +40,7 @@ impl<'a> Pooled<'a> {
     /// The variances of the first `n_wanted` parameters if residuals are independent only *between* the parts: within
     /// a part they may be correlated in any way. `None` where a part alone determines one of them.
     pub fn clustered(&self, n_wanted: usize) -> Option<Vec<f64>> {
-        self.clustered_of(&units(self.n)[..n_wanted])
+        self.clustered_of(&units(n_wanted, self.n))
     }
 
     /// The same of sums of parameters, each given by its weights.
@@ -138,9 +138,9 @@ pub fn larger(covariance: &[f64], variances: &[f64]) -> Vec<f64> {
     (0..n * n).map(|at| covariance[at] * factor[at / n] * factor[at % n]).collect()
 }
 
-/// The weights of sums that are the parameters themselves.
-pub fn units(n: usize) -> Vec<Vec<f64>> {
-    (0..n).map(|i| (0..n).map(|j| if i == j { 1.0 } else { 0.0 }).collect()).collect()
+/// The weights of sums that are the first `n_wanted` of n parameters themselves.
+pub fn units(n_wanted: usize, n: usize) -> Vec<Vec<f64>> {
+    (0..n_wanted).map(|i| (0..n).map(|j| if i == j { 1.0 } else { 0.0 }).collect()).collect()
 }
 
 /// The covariance of sums of parameters from that of the parameters: W·C·Wᵀ, row-major, W's rows the sums' weights.

@@ -162,12 +162,7 @@ fn distorted_depth_beside_rectified_colour_is_told() {
         let share = registration(audit).lens_share.expect("there are tables");
         assert!((share.value - whole).abs() < 2.0 * share.sigma && share.sigma < 0.25, "{share:?}");
         assert_eq!(audit.distortion_state, DistortionState::Rectified);
-        // Told where the share is beyond ½ by 2 σ.
-        let told = match (share.value - 0.5) / share.sigma {
-            z if z < -2.0 => DistortionState::Rectified,
-            z if z > 2.0 => DistortionState::Distorted,
-            _ => DistortionState::Unknown,
-        };
+        let told = DistortionState::Rectified.of_depth(Some(share));
         assert_eq!(audit.depth_distortion_state, told, "{share:?}");
         let finding = audit.findings.iter().find(|f| f.code == Code::TD203).expect("is checked");
         let warned = finding.verdict == Verdict::Warning;
