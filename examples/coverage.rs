@@ -5,6 +5,8 @@
 //! cargo run --release --example coverage -- --recordings 200
 //! ```
 //!
+//! `--seed N` takes other recordings: recording i is drawn from seed N + i, and N is 1000 otherwise.
+//!
 //! Recordings are simulated as corners with noise and whole depth maps with noise, holes and quantisation
 //! ([`truedepth::simulate::Plan::glimpse`]); `--rendered N` renders the first N of them as pictures, too, and detects
 //! the board in these.
@@ -23,10 +25,10 @@ use truedepth::{
 };
 
 /// Recordings of all devices in turn, with 15 to 30 frames, half of the boards wavy.
-fn plan(index: usize, faults: &[&str]) -> Plan {
+fn plan(index: usize, seed: usize, faults: &[&str]) -> Plan {
     let names = ["ipad-12.9-5gen", "ipad-12.9-4gen", "iphone-13"];
     let device = Device::named(names[index % names.len()]).expect("is known");
-    let mut plan = Plan::new(device, 1000 + index as u64);
+    let mut plan = Plan::new(device, (seed + index) as u64);
     let mut all = faults.to_vec();
     if index % 2 == 1 {
         all.push("bent=0.8mm");
@@ -181,8 +183,9 @@ fn number(flag: &str) -> Option<usize> {
 
 fn main() {
     let n = number("--recordings").unwrap_or(200);
+    let seed = number("--seed").unwrap_or(1000);
     let study = |title: &str, n: usize, faults: &[&str], how: fn(&Plan) -> Audit| {
-        let plans: Vec<Plan> = (0..n).map(|i| plan(i, faults)).collect();
+        let plans: Vec<Plan> = (0..n).map(|i| plan(i, seed, faults)).collect();
         let audits: Vec<Audit> = (0..n).into_par_iter().map(|i| how(&plans[i])).collect();
         table(title, &plans, &audits);
         for (which, name) in [(0, "of these flat boards"), (1, "of these wavy boards")] {
