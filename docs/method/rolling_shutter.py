@@ -46,6 +46,8 @@ class Problem:
     def __init__(self, views, board, size, moving):
         self.views, self.board, self.size, self.n_own = views, board, size, 12 if moving else 6
         self.n = 8 + len(board)
+        # Inverse variances of the shared numbers, known to be near zero beforehand.
+        self.precision = np.r_[np.zeros(8), np.full(len(board), HEIGHT_SIGMA_M**-2)]
 
     def view(self, i, shared, pose, derivatives):
         rotation, t, velocity = pose
@@ -82,7 +84,7 @@ class Problem:
         return residual, weight, by_shared, own
 
     def cost(self, shared, poses):
-        total = 0.5 * np.sum((shared[8:] / HEIGHT_SIGMA_M) ** 2)
+        total = 0.5 * self.precision @ shared**2
         for i, pose in enumerate(poses):
             residual, weight = self.view(i, shared, pose, False)
             s = weight * (residual**2).sum(1)
@@ -93,7 +95,6 @@ class Problem:
     def solve(self, shared, poses):
         damping, cost = 1e-4, self.cost(shared, poses)
         for _ in range(60):
-            prior = np.r_[np.zeros(8), np.full(self.n - 8, HEIGHT_SIGMA_M**-2)]
             parts = []
             for i, pose in enumerate(poses):
                 residual, weight, by_shared, own = self.view(i, shared, pose, True)
@@ -106,7 +107,7 @@ class Problem:
                     h[6:] -= pose[2] / VELOCITY_SIGMA**2
                 parts.append((v, h, a.T @ (weight[:, None] * b), a.T @ (weight[:, None] * a), a.T @ (weight * r)))
             while True:
-                s, q, inverses = np.diag((1 + damping) * prior), -prior * shared, []
+                s, q, inverses = np.diag((1 + damping) * self.precision), -self.precision * shared, []
                 for v, h, w, u, g in parts:
                     inverses.append(np.linalg.inv(v + damping * np.diag(np.diag(v))))
                     s = s + u + damping * np.diag(np.diag(u)) - w @ inverses[-1] @ w.T
