@@ -1,17 +1,17 @@
 //! The print, seen in the depth map: a second witness of zoom and shift.
 
-use nalgebra::{
-    Cholesky, Matrix2, Matrix3, Matrix4, Matrix5, SMatrix, SVector, Vector2, Vector3, Vector4,
-    Vector5,
-};
+use nalgebra::{Cholesky, Matrix2, Matrix4, Matrix5, SMatrix, SVector, Vector2, Vector4, Vector5};
 
-use super::{join::Seen, rays::RayGrid};
+use super::{
+    join::Seen,
+    rays::RayGrid,
+    texture::{NOTHING, Sums, Texture, UNIT_PER_M},
+};
 
 use crate::{
     board::{CharucoBoard, Layout},
     calibrate::{Estimate, abreast},
     geom::Pixel,
-    image::DepthMap,
     solve::mad_sigma,
 };
 
@@ -69,8 +69,6 @@ const LEAST_RESPONSE: f64 = 0.2;
 const LEAST_FRAMES: usize = 5;
 /// A frame with fewer cells says nothing.
 const LEAST_CELLS: usize = 200;
-/// The mean over so many cells to each side is taken out: of 640 pixels, 45.
-const REACH: usize = 4;
 /// How widely the sensor itself smooths, pixels (a Gaussian's σ): of 2 to 10, this explains most of the three published
 /// recordings' texture, or nearly. Where the sensor smooths otherwise the place is the same, and its σ a little larger.
 const SENSOR_BLUR_PX: f64 = 8.0;
@@ -172,159 +170,6 @@ fn blur(raster: &mut Vec<f32>, (columns, rows): (usize, usize), sigma: f64) {
             (0..weights.len()).map(|w| weights[w] * across[clamp(j + w, rows) * columns + i]).sum()
         })
         .collect();
-}
-
-/// What is rough in a depth map round the board: cells of some pixels, the frame's own plane and the mean over the
-/// neighbourhood taken out.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Texture {
-    /// Side of a cell, pixels.
-    pub cell_px: usize,
-    /// Column and row of the first cell, in cells.
-    first: [usize; 2],
-    columns: usize,
-    /// Cell minus mean of its neighbourhood, inverse depth in [`UNIT_PER_M`]; [`NOTHING`] where nothing was measured.
-    rough: Vec<i16>,
-}
-
-/// One step of a stored inverse depth: a hundredth of the noise at 0.2 m.
-const UNIT_PER_M: f64 = 1e-5;
-/// No measurement.
-const NOTHING: i16 = i16::MIN;
-/// Cells along the image's width.
-const CELLS_ACROSS: usize = 128;
-
-impl Texture {
-    /// Of a depth map without measurement.
-    pub fn nothing() -> Self {
-        Self { cell_px: 1, first: [0; 2], columns: 0, rough: Vec::new() }
-    }
-
-    /// Of the part of the map from `low` to `high` (exclusive), pixels.
-    pub(super) fn new(map: &DepthMap, low: [usize; 2], high: [usize; 2]) -> Self {
-        let cell_px = (map.width() / CELLS_ACROSS).max(2);
-        let first = low.map(|p| p / cell_px);
-        let [columns, rows] = [0, 1].map(|k| (high[k] / cell_px).saturating_sub(first[k]));
-        let mut cells: Vec<f64> = Vec::with_capacity(columns * rows);
-        for j in 0..rows {
-            for i in 0..columns {
-                let (mut sum, mut n) = (0.0, 0);
-                for y in (first[1] + j) * cell_px..(first[1] + j + 1) * cell_px {
-                    for x in (first[0] + i) * cell_px..(first[0] + i + 1) * cell_px {
-                        let depth_m = f64::from(map.at(x, y));
-                        if depth_m > 0.0 {
-                            sum += depth_m.recip();
-                            n += 1;
-                        }
-                    }
-                }
-                cells.push(if 4 * n >= 3 * cell_px * cell_px { sum / n as f64 } else { f64::NAN });
-            }
-        }
-        let mut texture = Self { cell_px, first, columns, rough: Vec::new() };
-        let plane = texture.plane(&cells);
-        for (k, value) in cells.iter_mut().enumerate() {
-            let [i, j] = [k % columns.max(1), k / columns.max(1)].map(|n| n as f64);
-            *value -= plane.x + plane.y * i + plane.z * j;
-        }
-        let sums = Sums::new(columns, cells.iter().map(|v| v.is_finite().then_some([*v])));
-        let stored = |(k, value): (usize, &f64)| {
-            let Some(([mean], _)) = sums.mean(k).filter(|_| value.is_finite()) else {
-                return NOTHING;
-            };
-            let units = ((value - mean) / UNIT_PER_M).round();
-            if units.abs() < f64::from(i16::MAX) { units as i16 } else { NOTHING }
-        };
-        texture.rough = cells.iter().enumerate().map(stored).collect();
-        texture
-    }
-
-    /// The plane through most cells: the board's, for a pinhole.
-    fn plane(&self, cells: &[f64]) -> Vector3<f64> {
-        let mut plane = Vector3::zeros();
-        let mut reach = f64::INFINITY;
-        for _ in 0..4 {
-            let (mut ata, mut atb) = (Matrix3::zeros(), Vector3::zeros());
-            let off = |k: usize, plane: &Vector3<f64>| {
-                let row = Vector3::new(1.0, (k % self.columns) as f64, (k / self.columns) as f64);
-                (row, cells[k] - row.dot(plane))
-            };
-            for k in (0..cells.len()).filter(|&k| cells[k].is_finite()) {
-                let (row, e) = off(k, &plane);
-                if e.abs() <= reach {
-                    ata += row * row.transpose();
-                    atb += row * cells[k];
-                }
-            }
-            let Some(inverse) = ata.try_inverse() else { break };
-            plane = inverse * atb;
-            let left: Vec<f64> = (0..cells.len())
-                .filter(|&k| cells[k].is_finite())
-                .map(|k| off(k, &plane).1)
-                .collect();
-            reach = 4.0 * mad_sigma(&left, 0.0);
-        }
-        plane
-    }
-
-    /// Middle of a cell in the depth map.
-    fn at(&self, k: usize) -> Pixel {
-        let along = |first: usize, i: usize| {
-            ((first + i) * self.cell_px) as f64 + 0.5 * (self.cell_px as f64 - 1.0)
-        };
-        Pixel::new(along(self.first[0], k % self.columns), along(self.first[1], k / self.columns))
-    }
-}
-
-/// Sums over rectangles of a grid of cells, some without value.
-struct Sums<const N: usize> {
-    columns: usize,
-    rows: usize,
-    /// Up to and without row j and column i: values, and how many.
-    table: Vec<([f64; N], u32)>,
-}
-
-impl<const N: usize> Sums<N> {
-    fn new(columns: usize, cells: impl ExactSizeIterator<Item = Option<[f64; N]>>) -> Self {
-        let rows = cells.len().checked_div(columns).unwrap_or(0);
-        let wide = columns + 1;
-        let mut table = vec![([0.0; N], 0); wide * (rows + 1)];
-        let mut row = ([0.0; N], 0);
-        for (k, cell) in cells.enumerate() {
-            let (i, j) = (k % columns, k / columns);
-            if i == 0 {
-                row = ([0.0; N], 0);
-            }
-            if let Some(cell) = cell {
-                row.0.iter_mut().zip(cell).for_each(|(sum, value)| *sum += value);
-                row.1 += 1;
-            }
-            let above = table[j * wide + i + 1];
-            table[(j + 1) * wide + i + 1] =
-                (std::array::from_fn(|n| above.0[n] + row.0[n]), above.1 + row.1);
-        }
-        Self { columns, rows, table }
-    }
-
-    /// Mean over the neighbourhood of a cell, and whether it is whole; `None` where a quarter or more is missing.
-    fn mean(&self, k: usize) -> Option<([f64; N], bool)> {
-        let (i, j) = (k % self.columns, k / self.columns);
-        let (x0, y0) = (i.checked_sub(REACH)?, j.checked_sub(REACH)?);
-        let (x1, y1) = (i + REACH + 1, j + REACH + 1);
-        if x1 > self.columns || y1 > self.rows {
-            return None;
-        }
-        let wide = self.columns + 1;
-        let [a, b, c, d] = [y0 * wide + x0, y0 * wide + x1, y1 * wide + x0, y1 * wide + x1]
-            .map(|at| self.table[at]);
-        let n = d.1 + a.1 - b.1 - c.1;
-        let all = (2 * REACH + 1).pow(2) as u32;
-        if 4 * n < 3 * all {
-            return None;
-        }
-        let mean = |m: usize| (d.0[m] - b.0[m] - c.0[m] + a.0[m]) / f64::from(n);
-        Some((std::array::from_fn(mean), n == all))
-    }
 }
 
 /// Where a pixel of the depth map looks on the board.
@@ -629,6 +474,7 @@ mod tests {
     use nalgebra::Rotation2;
 
     use super::{super::test_noise::Noise, *};
+    use crate::image::DepthMap;
 
     const CENTER: Pixel = Pixel { x: 319.5, y: 239.5 };
 
@@ -739,20 +585,5 @@ mod tests {
         let place = place(1.0, [0.0; 2]);
         let nothing = Measured { place, contrast_m: 0.0, blur_m: 0.004, noise_m: 0.0003 };
         assert_eq!(nothing.found(6, 3), None);
-    }
-
-    #[test]
-    fn a_plane_has_no_texture_and_holes_have_none_either() {
-        let depth = |i: usize| {
-            let (x, y) = ((i % 640) as f64, (i / 640) as f64);
-            let hole = (300.0..330.0).contains(&x) && (200.0..230.0).contains(&y);
-            if hole { f32::NAN } else { (4.0 + 0.002 * x - 0.001 * y).recip() as f32 }
-        };
-        let map = DepthMap::new(640, 480, (0..640 * 480).map(depth).collect());
-        let texture = Texture::new(&map, [100, 70], [540, 410]);
-        let measured: Vec<i16> = texture.rough.iter().copied().filter(|r| *r != NOTHING).collect();
-        assert!(measured.iter().all(|r| r.abs() <= 2), "{:?}", measured.iter().max());
-        // The frame of the neighbourhood, and the hole with what is next to it.
-        assert!((4000..5700).contains(&measured.len()), "{}", measured.len());
     }
 }

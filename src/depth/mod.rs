@@ -51,12 +51,14 @@ mod stance;
 mod temporal;
 #[cfg(test)]
 mod test_noise;
+mod texture;
 
 pub(crate) use against_board::corner_on;
 pub use against_board::{BoardDepth, FrameDepth, MAX_ERROR_M, Sample, against_board, sense};
 pub use handedness::{CornerDepth, Handedness, handedness};
-pub use imprint::{Imprint, Texture};
+pub use imprint::Imprint;
 pub use patch::{DepthSteps, Patch, Patches, patches};
 pub use pattern::{Holes, MAX_INCIDENCE_DEG, NEAR_M, Pattern, PatternCell};
 pub use register::{OtherState, RegisterInput, Registration, Slopes, register};
 pub use temporal::{Lattice, NoiseAtRange, STILL_PX, TemporalNoise, temporal_noise};
+pub use texture::Texture;

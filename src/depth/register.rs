@@ -5,12 +5,13 @@ use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, Vector2, Vector3};
 use super::{
     Patch, Patches,
     between::{BIAS, N, Plane, Prior, SCALE, SHIFT, Step, ZOOM, between_frames},
-    imprint::{self, Imprint, Place, Print, Spot, Texture},
+    imprint::{self, Imprint, Place, Print, Spot},
     join::{Joined, Seen, join},
     pattern::{Holes, MAX_INCIDENCE_DEG, NEAR_M, Pattern, Residual},
     rays::RayGrid,
     relief::Relief,
     stance::{Stance, moved_cameras, stances},
+    texture::Texture,
 };
 use crate::{
     board::CharucoBoard,
