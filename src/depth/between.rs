@@ -78,10 +78,6 @@ impl<const M: usize> Prior<M> {
         let precision = covariance.try_inverse().expect("a covariance");
         Self { mean, covariance, precision }
     }
-
-    pub(super) fn sigma(&self) -> SVector<f64, M> {
-        self.covariance.diagonal().map(f64::sqrt)
-    }
 }
 
 /// ρ, how much the sensor adds to what the poses are unsure by, is not known and often not well told: the likelihood

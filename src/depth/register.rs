@@ -116,6 +116,8 @@ pub type OtherState<'a> = dyn Fn(Pixel) -> Option<Pixel> + Sync + 'a;
 type Numbers = SVector<f64, N>;
 type Square = SMatrix<f64, N, N>;
 
+/// A step is the last but one where no number moves by more than this share of its σ.
+const SMALL_STEP: f64 = 1e-3;
 /// Frames below this number of patches say nothing about a plane.
 const LEAST_PATCHES: usize = 12;
 /// Frames below this number do not even disagree.
@@ -195,7 +197,8 @@ pub fn register(input: &RegisterInput<'_>) -> Option<Registration> {
         for _ in 0..12 {
             let step = step_at(&planes_at(&theta, false)?, &theta)?;
             theta += step.delta;
-            if step.delta.component_div(&prior.sigma()).amax() < 1e-7 {
+            let sigma = step.covariance.diagonal().map(f64::sqrt);
+            if step.delta.component_div(&sigma).amax() < SMALL_STEP {
                 break;
             }
         }
@@ -282,24 +285,31 @@ impl Scene<'_> {
         Some(self.hit(stance, ray)?.depth_m)
     }
 
-    /// Where a ray meets the board; `None` beside it.
-    fn hit(&self, stance: &Stance, ray: [f64; 2]) -> Option<Hit> {
+    /// Where a ray meets the board's own plane: the depth, metres, and the place on the board; `None` beside it.
+    fn flat_hit(&self, stance: &Stance, ray: [f64; 2]) -> Option<(f64, Vector3<f64>)> {
         let ray = Vector3::new(ray[0], ray[1], 1.0);
         let flat_m = stance.plane.dot(&ray).recip();
         if !(flat_m > 0.0 && flat_m.is_finite()) {
             return None;
         }
-        let size_m =
-            [self.board.squares_x, self.board.squares_y].map(|n| n as f64 * self.board.square_m);
+        let size_m = self.size_m();
         let pose = &stance.color_from_board;
         let on_board = pose.rotation.inverse() * (ray * flat_m - pose.translation);
         let inside = |x: f64, size: f64| (0.0..=size).contains(&x);
-        if !(inside(on_board.x, size_m[0]) && inside(on_board.y, size_m[1])) {
-            return None;
-        }
+        (inside(on_board.x, size_m[0]) && inside(on_board.y, size_m[1]))
+            .then_some((flat_m, on_board))
+    }
+
+    fn size_m(&self) -> [f64; 2] {
+        [self.board.squares_x, self.board.squares_y].map(|n| n as f64 * self.board.square_m)
+    }
+
+    /// Where a ray meets the board; `None` beside it.
+    fn hit(&self, stance: &Stance, ray: [f64; 2]) -> Option<Hit> {
+        let (flat_m, on_board) = self.flat_hit(stance, ray)?;
         let height_m = self.relief.height_m(on_board.x, on_board.y);
         let by_height = flat_m / stance.distance_m;
-        let from_middle = on_board.xy() - 0.5 * Vector2::from(size_m);
+        let from_middle = on_board.xy() - 0.5 * Vector2::from(self.size_m());
         Some(Hit {
             depth_m: flat_m + by_height * height_m,
             by_board: by_height * Vector3::new(1.0, from_middle.x, from_middle.y),
@@ -392,7 +402,7 @@ impl Scene<'_> {
                     .all(|(dx, dy)| {
                         let p = self.looked_at(Pixel::new(patch.at.x + dx, patch.at.y + dy), theta);
                         let seen = self.rays.at(p);
-                        seen.is_some_and(|(ray, _)| self.board_depth(stance, ray).is_some())
+                        seen.is_some_and(|(ray, _)| self.flat_hit(stance, ray).is_some())
                     });
                 if !on_board {
                     return None;
@@ -584,7 +594,7 @@ fn assemble(
         }
         for &(at, n_holes) in &patches.torn {
             let seen = scene.rays.at(scene.looked_at(at, &theta));
-            if seen.is_some_and(|(ray, _)| scene.board_depth(stance, ray).is_some()) {
+            if seen.is_some_and(|(ray, _)| scene.flat_hit(stance, ray).is_some()) {
                 holes.add(patches.side_px.pow(2), n_holes, scene.in_reach(stance, at, &theta));
             }
         }

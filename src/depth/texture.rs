@@ -55,8 +55,10 @@ impl Texture {
             let Some(([mean], _)) = sums.mean(k).filter(|_| value.is_finite()) else {
                 return NOTHING;
             };
-            let units = ((value - mean) / UNIT_PER_M).round();
-            if units.abs() < f64::from(i16::MAX) { units as i16 } else { NOTHING }
+            let units = (value - mean) / UNIT_PER_M;
+            // Rounded without a call: not all processors have an instruction for it.
+            let nearest = (units + 0.5_f64.copysign(units)) as i32;
+            i16::try_from(nearest).unwrap_or(NOTHING)
         };
         texture.rough = cells.iter().enumerate().map(stored).collect();
         texture
@@ -110,24 +112,25 @@ fn cell_means(
         #[inline(always)]
         || {
             let mut means = Vec::with_capacity(columns * rows);
-            let mut inverse = vec![0.0; columns * cell_px];
-            let mut sums = vec![(0.0, 0); columns];
+            // Down the columns of pixels first: neighbours side by side.
+            let mut sums = vec![0.0; columns * cell_px];
+            let mut counts = sums.clone();
+            let enough = 0.75 * (cell_px * cell_px) as f64;
             for j in first[1]..first[1] + rows {
-                sums.fill((0.0, 0));
+                sums.fill(0.0);
+                counts.fill(0.0);
                 for y in j * cell_px..(j + 1) * cell_px {
                     let line = &map.depth_m()[y * map.width() + first[0] * cell_px..];
-                    for (inverse, &depth_m) in inverse.iter_mut().zip(line) {
-                        *inverse = if depth_m > 0.0 { f64::from(depth_m).recip() } else { 0.0 };
-                    }
-                    for ((sum, n), inverse) in sums.iter_mut().zip(inverse.chunks_exact(cell_px)) {
-                        for inverse in inverse {
-                            *sum += inverse;
-                            *n += usize::from(*inverse > 0.0);
-                        }
+                    for ((sum, n), &depth_m) in sums.iter_mut().zip(&mut counts).zip(line) {
+                        let is_measured = depth_m > 0.0;
+                        *sum += if is_measured { f64::from(depth_m).recip() } else { 0.0 };
+                        *n += if is_measured { 1.0 } else { 0.0 };
                     }
                 }
-                means.extend(sums.iter().map(|&(sum, n)| {
-                    if 4 * n >= 3 * cell_px * cell_px { sum / n as f64 } else { f64::NAN }
+                let cells = sums.chunks_exact(cell_px).zip(counts.chunks_exact(cell_px));
+                means.extend(cells.map(|(sums, counts)| {
+                    let n: f64 = counts.iter().sum();
+                    if n >= enough { sums.iter().sum::<f64>() / n } else { f64::NAN }
                 }));
             }
             means
