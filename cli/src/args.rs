@@ -329,7 +329,9 @@ pub(crate) struct AuditArgs {
 
     /// Take the camera from this file instead of calibrating
     ///
-    /// The file is what `truedepth calibrate --json` printed, or the report.json of an audit.
+    /// The file is what `truedepth calibrate --json` printed, or the report.json of an audit. What it knows of its own
+    /// errors counts in every verdict. It must be of the device that recorded: the factory's focal lengths are
+    /// compared.
     #[arg(long, value_name = "FILE", conflicts_with = "method")]
     pub(crate) calibration: Option<PathBuf>,
 

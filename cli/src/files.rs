@@ -148,9 +148,7 @@ pub(crate) fn write_together(
         for (path, bytes) in files {
             if path.exists() && !fs::read(path).is_ok_and(|there| there == *bytes) {
                 let message = format!("{} is there already; nothing was written", path.display());
-                return Err(
-                    Failure::new(message).hint("--force replaces it; or name another folder")
-                );
+                return Err(Failure::new(message).hint("--force replaces it; or name another"));
             }
         }
     }

@@ -7,11 +7,12 @@ use std::{
 
 use truedepth::{
     board::{CharucoBoard, Dictionary},
+    calibrate::KnownCamera,
     camera::Camera,
     diagnose::{self, Registry, Sheet},
     image,
     recording::{self, Found, Limits, Recording, board_from_toml},
-    report::wire::Document,
+    report::wire::{self, Document},
 };
 
 use crate::{
@@ -106,7 +107,7 @@ pub(crate) fn read(path: &Path) -> Result<Vec<u8>, Failure> {
 fn unreadable(path: &Path, e: std::io::Error) -> Failure {
     Failure::from(e)
         .within(format!("cannot read {}", path.display()))
-        .hint("check that it is there, is a file, and that you have the right to read it")
+        .hint("check that it is there, and that you have the right to read it")
 }
 
 /// The board that was given, if one was.
@@ -195,18 +196,28 @@ pub(crate) fn document(path: &Path) -> Result<Document, Failure> {
 
 /// The camera that `truedepth calibrate --json` or `audit --json` wrote.
 pub(crate) fn camera(path: &Path) -> Result<Camera, Failure> {
-    let hint = "give what `truedepth calibrate REC --json` printed, or the report.json of an audit that calibrated";
-    let wrong = |failure: Failure| {
-        failure.within(format!("{} holds no calibration", path.display())).hint(hint)
-    };
+    calibration(path)?.camera().map_err(|e| no_calibration(path, e.into()))
+}
+
+/// The same with what the calibration knows of its errors.
+pub(crate) fn known_camera(path: &Path) -> Result<KnownCamera, Failure> {
+    calibration(path)?.known().map_err(|e| no_calibration(path, e.into()))
+}
+
+fn calibration(path: &Path) -> Result<wire::Calibration, Failure> {
+    let wrong = |failure: Failure| no_calibration(path, failure);
     let text = fs::read_to_string(path).map_err(|e| unreadable(path, e))?;
-    let calibration = match Document::from_json(&text).map_err(|e| wrong(e.into()))? {
-        Document::Calibrate(calibration) => *calibration,
+    match Document::from_json(&text).map_err(|e| wrong(e.into()))? {
+        Document::Calibrate(calibration) => Ok(*calibration),
         Document::Audit(audit) => {
-            audit.calibration.ok_or_else(|| wrong(Failure::new("this audit did not calibrate")))?
+            audit.calibration.ok_or_else(|| wrong(Failure::new("this audit did not calibrate")))
         }
-        Document::Detect(_) => return Err(wrong(Failure::new("it holds detected corners"))),
-        _ => return Err(wrong(Failure::new("it is the result of another verb"))),
-    };
-    calibration.camera().map_err(|e| wrong(e.into()))
+        Document::Detect(_) => Err(wrong(Failure::new("it holds detected corners"))),
+        _ => Err(wrong(Failure::new("it is the result of another verb"))),
+    }
+}
+
+fn no_calibration(path: &Path, failure: Failure) -> Failure {
+    let hint = "give what `truedepth calibrate REC --json` printed, or the report.json of an audit that calibrated";
+    failure.within(format!("{} holds no calibration", path.display())).hint(hint)
 }

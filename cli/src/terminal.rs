@@ -113,6 +113,11 @@ impl Terminal {
         }
     }
 
+    /// What should not be overlooked, on stderr, also with `-q`.
+    pub(crate) fn warn(&self, text: &str) {
+        self.stderr(&format!("{}: {text}", self.paint_stderr(Tone::Unsure, "warning")));
+    }
+
     /// Why the run failed, on stderr, also with `-q`.
     pub(crate) fn failure(&self, failure: &Failure) {
         self.stderr(&format!("{}: {}", self.paint_stderr(Tone::Bad, "error"), failure.message));

@@ -4,8 +4,8 @@ use super::{Audit, Error, FrameAudit, Method, Options, Progress, Stage};
 use crate::{
     board::{CharucoBoard, Layout},
     calibrate::{
-        self, BoardSurface, Calibration, DistortionTest, FrameCorners, RejectedFrame, Rejection,
-        distortion_test,
+        self, BoardSurface, Calibration, DistortionTest, FrameCorners, KnownCamera, Parameter,
+        RejectedFrame, Rejection, distortion_test,
     },
     camera::{Camera, Distortion},
     depth::{
@@ -26,6 +26,9 @@ const LEAST_CORNERS: usize = 9;
 /// What no corner is better than, pixels: the boards of the published recordings are uneven by 0.8 mm, which is a tenth
 /// of a pixel and more at their distance.
 const CORNER_FLOOR_PX: f64 = 0.1;
+
+/// Focal lengths that factories tell of one model of camera differ by less.
+const SAME_CAMERA: f64 = 0.015;
 
 /// What is known of a recording beside its images.
 pub(super) struct Ground<'a> {
@@ -114,7 +117,8 @@ pub(super) fn conclude(
     observer: &(dyn Fn(Progress) + Sync),
 ) -> Result<Audit, Error> {
     let layout = most_seen_layout(&frames);
-    board.layout = board.layout.or(layout);
+    // What is seen goes before what was said: markers of the other layout are nowhere near.
+    board.layout = layout.or(board.layout);
     let size_px = frames.iter().find_map(|f| f.size_px);
     let factory = ground.factory;
     let n_frames = frames.len();
@@ -144,7 +148,7 @@ pub(super) fn conclude(
         .then(|| compare(&board, own.surface(), &frames, |f| f.own_view.as_ref()));
     let pairs = own.views_with_depth(&frames);
     let registration = own.camera.as_ref().and_then(|camera| {
-        let calibration = own.calibration.as_ref();
+        let (parameters, covariance) = own.uncertainty();
         let tables = factory.and_then(|f| f.tables.as_ref());
         let pinhole = Camera { intrinsics: camera.intrinsics, distortion: Distortion::None };
         let other = |at: Pixel| match (&camera.distortion, tables) {
@@ -159,7 +163,9 @@ pub(super) fn conclude(
         register(&RegisterInput {
             board: &board,
             camera,
-            calibration,
+            parameters,
+            covariance,
+            surface: own.surface(),
             views: &pairs,
             other_state: if known { Some(&other) } else { None },
         })
@@ -184,6 +190,7 @@ pub(super) fn conclude(
         calibration: own.calibration.as_ref(),
         no_calibration: own.why_not.as_deref(),
         camera: own.camera.as_ref(),
+        given: own.given.as_ref(),
         factory_views: &frames.iter().filter_map(|f| f.factory_view.as_ref()).collect::<Vec<_>>(),
         own_views: &frames.iter().filter_map(|f| f.own_view.as_ref()).collect::<Vec<_>>(),
         factory_depth: factory_depth.as_ref(),
@@ -271,12 +278,23 @@ fn compare<'a>(
 struct Own {
     camera: Option<Camera>,
     calibration: Option<Calibration>,
+    /// Where the camera is given.
+    given: Option<KnownCamera>,
     why_not: Option<String>,
 }
 
 impl Own {
     fn surface(&self) -> Option<&BoardSurface> {
         self.calibration.as_ref().and_then(|c| c.surface.as_ref())
+    }
+
+    /// The camera's free numbers and their covariance; none of a camera that is exact or not known.
+    fn uncertainty(&self) -> (&[Parameter], &[f64]) {
+        match (&self.calibration, &self.given) {
+            (Some(calibration), _) => (&calibration.parameters, &calibration.covariance),
+            (None, Some(given)) => (&given.parameters, &given.covariance),
+            (None, None) => (&[], &[]),
+        }
     }
 
     /// The calibration's own test, or one beside a calibration that has none (method paper, camera given).
@@ -309,9 +327,15 @@ impl Own {
             .collect()
     }
 
-    /// The board's pose in a frame with the own camera, corners left out that disagree with all others.
+    /// The board's pose in a frame with the own camera, corners left out that disagree with all others: where the
+    /// board has a shape, that of the calibration, which knows it.
     fn view(&self, index: usize, board: &CharucoBoard, corners: &[Corner]) -> Option<View> {
         let camera = self.camera.as_ref()?;
+        if let Some(calibration) = self.calibration.as_ref().filter(|c| c.surface.is_some())
+            && let Some(view) = calibration.views.iter().find(|view| view.frame == index)
+        {
+            return Some(view.clone());
+        }
         let mut corners = corners.to_vec();
         if let Some(calibration) = &self.calibration {
             let disagrees = |r: &RejectedFrame| {
@@ -336,11 +360,20 @@ fn own_camera(
 ) -> Result<Own, Error> {
     let size_px = frames.iter().find_map(|f| f.size_px);
     let method = match &options.method {
-        Method::Given(camera) => {
+        Method::Given(given) => {
+            let given = &**given;
             if let Some(size) = size_px {
-                camera.check_size(size, ground.place)?;
+                given.camera.check_size(size, ground.place)?;
             }
-            return Ok(Own { camera: Some((**camera).clone()), ..Own::default() });
+            let recorded = ground.factory.map(|factory| factory.intrinsics.focal_px());
+            if let (Some(given_px), Some(recorded_px)) = (given.factory_focal_px, recorded)
+                && (given_px / recorded_px - 1.0).abs() > SAME_CAMERA
+            {
+                let recording = ground.place.to_owned();
+                return Err(Error::OtherCamera { recording, given_px, recorded_px });
+            }
+            let camera = Some(given.camera.clone());
+            return Ok(Own { camera, given: Some(given.clone()), ..Own::default() });
         }
         Method::Paper => calibrate::Method::Paper,
         Method::Auto => calibrate::Method::Auto,
@@ -358,7 +391,7 @@ fn own_camera(
         Ok(calibration) => Ok(Own {
             camera: Some(calibration.camera.clone()),
             calibration: Some(calibration),
-            why_not: None,
+            ..Own::default()
         }),
         Err(error) => why_not(why_not_calibrated(&error)),
     }

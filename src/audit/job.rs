@@ -152,6 +152,19 @@ pub enum Error {
     /// A camera from outside for images of another size.
     #[error(transparent)]
     CameraSize(#[from] OtherSize),
+    /// A calibration of another camera than the one that recorded.
+    #[error(
+        "{recording}: the calibration given is of another camera: its factory says {given_px:.1} px of focal length, \
+         this recording's says {recorded_px:.1} px; calibrate the device that made this recording"
+    )]
+    OtherCamera {
+        /// Where the recording is.
+        recording: String,
+        /// The factory's focal length beside the calibration.
+        given_px: f64,
+        /// The factory's focal length in the recording.
+        recorded_px: f64,
+    },
 }
 
 /// Is shown a frame's index and its colour image.
@@ -281,6 +294,7 @@ mod tests {
 
     use super::*;
     use crate::{
+        calibrate::KnownCamera,
         camera::{Distortion, Intrinsics},
         image::{DepthMap, Rgb},
         recording::{Limits, Memory, Writer},
@@ -346,7 +360,8 @@ mod tests {
         let intrinsics =
             Intrinsics { fx: 60.0, fy: 60.0, cx: 31.5, cy: 23.5, width: 640, height: 480 };
         let camera = Camera { intrinsics, distortion: Distortion::None };
-        let given = Options { method: Method::Given(Box::new(camera)), ..options() };
+        let given =
+            Options { method: Method::Given(Box::new(KnownCamera::exact(camera))), ..options() };
         let error = audit(&open(files()), &given).expect_err("another size");
         assert!(
             matches!(&error, Error::CameraSize(e) if (e.given, e.size) == ([640, 480], [64, 48])),

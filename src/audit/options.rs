@@ -1,6 +1,10 @@
 //! What the shells choose, and what they are told on the way.
 
-use crate::{board::CharucoBoard, calibrate::MAX_VIEWS, camera::Camera, diagnose::Tolerances};
+use crate::{
+    board::CharucoBoard,
+    calibrate::{KnownCamera, MAX_VIEWS},
+    diagnose::Tolerances,
+};
 
 /// Where the own intrinsics come from.
 #[derive(Clone, Debug, PartialEq)]
@@ -10,7 +14,7 @@ pub enum Method {
     /// The camera model that predicts held-out corners best.
     Auto,
     /// A camera known from elsewhere; nothing is calibrated.
-    Given(Box<Camera>),
+    Given(Box<KnownCamera>),
 }
 
 impl Method {

@@ -165,7 +165,7 @@ fn flexible<'a>(
     for (center, warp) in cameras {
         let fits = abreast(&surfaces, |surface| {
             let shape = shape_of(center, warp, *surface);
-            Some((shape, fit_with(input, prepared, shape, loss)?))
+            Some((shape, fit_with(input, prepared, shape, (loss, Wanted::Camera))?))
         });
         // A camera that a flat board does not determine, no other board does.
         match fits.first() {
@@ -243,12 +243,27 @@ pub(super) fn fit_prepared(
     prepared: &Prepared,
     shape: Shape<'_>,
 ) -> Option<Fit> {
-    fit_with(input, prepared, shape, LOSS)
+    fit_with(input, prepared, shape, (LOSS, Wanted::Camera))
 }
 
-fn fit_with(input: &Input<'_>, prepared: &Prepared, shape: Shape<'_>, loss: Loss) -> Option<Fit> {
+/// The same, and what motion while rows are read does to the centre.
+pub(super) fn fit_in_motion(
+    input: &Input<'_>,
+    prepared: &Prepared,
+    shape: Shape<'_>,
+) -> Option<Fit> {
+    fit_with(input, prepared, shape, (LOSS, Wanted::CameraInMotion))
+}
+
+fn fit_with(
+    input: &Input<'_>,
+    prepared: &Prepared,
+    shape: Shape<'_>,
+    (loss, wanted): (Loss, Wanted),
+) -> Option<Fit> {
     let references = prepared.references();
-    let data = data(input, prepared, (&references, &prepared.pictures), loss);
+    let all = (references.as_slice(), prepared.pictures.as_slice());
+    let data = Data { wanted, ..data(input, prepared, all, loss) };
     let poses: Vec<_> = prepared.views.iter().map(|v| v.pose).collect();
     let mut free = shape.start(&prepared.near);
     if matches!(shape.warp, Warp::FreeRadial1 | Warp::FreeRadial2 | Warp::FreeBrown) {

@@ -13,6 +13,8 @@ const CELLS: usize = 3;
 /// A view tilted less says little about the focal length.
 const TILTED_DEG: f64 = 15.0;
 
+/// A ninth of the image with fewer of all corners says next to nothing of the lens there.
+const LEAST_SHARE: f64 = 0.01;
 /// A calibration this uncertain somewhere in the image is not known there, pixels.
 const UNKNOWN_PX: f64 = 1.0;
 
@@ -93,13 +95,14 @@ impl Coverage {
         coverage
     }
 
-    /// The sides of the board of which no view has it nearest, tilted by 15° or more: `right`, `bottom`, `left`, `top`.
+    /// The sides of the board of which no view has it nearest, within 45° and tilted by 15° or more: `right`, `bottom`,
+    /// `left`, `top`.
     pub fn missing_tilts(&self) -> Vec<&'static str> {
         const SIDES: [(f64, &str); 4] =
             [(0.0, "right"), (90.0, "bottom"), (180.0, "left"), (-90.0, "top")];
         let towards = |view: &Tilt, side_deg: f64| {
             let off = (view.nearest_deg - side_deg).rem_euclid(360.0);
-            view.tilt_deg >= TILTED_DEG && off.min(360.0 - off) <= 60.0
+            view.tilt_deg >= TILTED_DEG && off.min(360.0 - off) <= 45.0
         };
         SIDES
             .into_iter()
@@ -108,10 +111,12 @@ impl Coverage {
             .collect()
     }
 
-    /// The parts of the image without a corner: `top left`, `middle`, `bottom` and the like.
+    /// The parts of the image without a corner, or with hardly any: `top left`, `middle`, `bottom` and the like.
     pub fn missing_places(&self) -> Vec<&'static str> {
-        let empty = self.n_corners.iter().zip(Self::PLACES).filter(|(n, _)| **n == 0);
-        empty.map(|(_, name)| name).collect()
+        let all: usize = self.n_corners.iter().sum();
+        let is_missing = |n: usize| n == 0 || (n as f64) < LEAST_SHARE * all as f64;
+        let missing = self.n_corners.iter().zip(Self::PLACES).filter(|(n, _)| is_missing(**n));
+        missing.map(|(_, name)| name).collect()
     }
 
     /// What to record; `None` where nothing is missing.
@@ -138,7 +143,7 @@ impl Calibration {
     /// The largest σ of the projection in the image, pixels, where it is so large that the calibration is not known
     /// there (above 1 px at the views' median distance); `None` where it is known everywhere.
     pub fn unknown_px(&self) -> Option<f64> {
-        let grid = self.projection_uncertainty(9, 7, self.median_distance_m()?)?;
+        let grid = self.projection_uncertainty(17, 13, self.median_distance_m()?)?;
         let worst = grid.sigma_px.into_iter().filter(|s| !s.is_nan()).fold(0.0, f64::max);
         (worst > UNKNOWN_PX).then_some(worst)
     }

@@ -3,7 +3,7 @@
 use super::{
     DistortionTest, Estimate, Hypothesis, Input, Lens,
     abreast::abreast,
-    auto::{Prepared, behind_sigmas, fit_prepared, shape_rms_px},
+    auto::{Prepared, behind_sigmas, fit_in_motion, fit_prepared, shape_rms_px},
     fit::Fit,
     model::{Aspect, Center, Shape, Warp, brown},
     surface::Surface,
@@ -23,7 +23,7 @@ pub(super) fn test(input: &Input<'_>, prepared: &Prepared) -> Option<DistortionT
     warps.extend([(Lens::FreeRadial, Warp::FreeRadial1), (Lens::FreeRadial, Warp::FreeRadial2)]);
     let mut found = abreast(&warps, |&(lens, warp)| {
         let shape = shape_of(warp, prepared.surface);
-        let fit = fit_prepared(input, prepared, shape).filter(|fit| fit.covariance.is_some())?;
+        let fit = fit_in_motion(input, prepared, shape).filter(|fit| fit.covariance.is_some())?;
         let flat = Shape { surface: Surface::Flat, ..shape };
         let flat_rms_px = match prepared.surface {
             Surface::Flat => shape_rms_px(input, prepared, shape, &fit),

@@ -35,6 +35,8 @@ pub(super) struct Data<'a> {
 pub(super) enum Wanted {
     /// The camera's numbers and their covariance.
     Camera,
+    /// These, and what motion while rows are read does to the centre's σ.
+    CameraInMotion,
     /// Those of the surface and of the poses, too.
     Everything,
 }
@@ -76,7 +78,7 @@ pub(super) struct Fit {
     pub(super) held_out: Vec<f64>,
     /// For each picture the focal length that all others have, pixels; `None` where these do not determine it.
     pub(super) left_out_focal_px: Vec<Option<f64>>,
-    /// What becomes of the fit where views may move while their rows are read; only where [`Wanted::Everything`] was.
+    /// What becomes of the fit where views may move while their rows are read; not where [`Wanted::Camera`] was.
     pub(super) shutter: Option<Shutter>,
     /// How the poses go with the camera; only where [`Wanted::Everything`] was.
     pub(super) motion: Option<MeanMotion>,
@@ -114,10 +116,11 @@ pub(super) struct Shutter {
     pub(super) shift: Vec<f64>,
 }
 
-/// Where velocities leave less than this share of the residuals' standard deviation, views did move: without a rolling
-/// shutter it stays near one, since the degrees of freedom are counted. A turn while rows are read looks like another
-/// principal point; hands turn the same way again and again, so that this does not average out, and its σ has to know.
-const MOVING_SHARE: f64 = 0.8;
+/// Where velocities leave less than the second share of the residuals' standard deviation, views did move; above the
+/// first they did not: without a rolling shutter it stays near one, since the degrees of freedom are counted. A turn
+/// while rows are read looks like another principal point; hands turn the same way again and again, so that this does
+/// not average out, and its σ has to know.
+const STILL_TO_MOVING: [f64; 2] = [0.9, 0.8];
 
 /// The least-squares fit of `shape` from `start`. `None` where the start does not project, or there are fewer residuals
 /// than parameters.
@@ -179,7 +182,7 @@ fn fit_sized<const S: usize>(shape: Shape<'_>, data: &Data<'_>, start: Start<'_>
     // Heights from a plane that no picture tells from the poses are as unsure as beforehand, all of them alike, and
     // what makes the residuals of a picture alike is lost in that: heights from the board's own plane are asked for.
     let sums = match data.wanted {
-        Wanted::Camera => units(S, n),
+        Wanted::Camera | Wanted::CameraInMotion => units(S, n),
         Wanted::Everything => {
             let mut sums = units(n, n);
             data.sheet.take_planes_out(shape.surface, &mut sums);
@@ -197,13 +200,15 @@ fn fit_sized<const S: usize>(shape: Shape<'_>, data: &Data<'_>, start: Start<'_>
             None => classical,
         }
     });
-    let shutter = (data.wanted == Wanted::Everything)
+    let shutter = (data.wanted != Wanted::Camera)
         .then(|| shutter(&problem, &minimum.normal, (&shared, &loose), &poses))
         .flatten();
     let covariance = covariance.map(|covariance| match &shutter {
-        Some(shutter) if shutter.share < MOVING_SHARE && shape.center == Center::Free => {
+        Some(shutter) if shape.center == Center::Free => {
+            let [still, moving] = STILL_TO_MOVING;
+            let counts = ((still - shutter.share) / (still - moving)).clamp(0.0, 1.0);
             let mut variances: Vec<f64> = (0..3).map(|i| covariance[i * n + i]).collect();
-            (1..3).for_each(|i| variances[i] += shutter.shift[i] * shutter.shift[i]);
+            (1..3).for_each(|i| variances[i] += counts * shutter.shift[i].powi(2));
             larger(&covariance, &variances)
         }
         _ => covariance,

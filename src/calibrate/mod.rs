@@ -83,6 +83,7 @@ pub use coverage::{Coverage, Tilt, coverage};
 pub use guess::guess_intrinsics;
 pub use job::{MAX_VIEWS, calibrate, calibrate_from, distortion_test};
 pub use model::Model;
+pub(crate) use model::moved;
 pub use motion::{MeanMotion, ProjectionUncertainty};
 pub(crate) use surface::alike;
 
@@ -278,7 +279,8 @@ pub struct LeftOutPicture {
 /// The calibration does not correct for it: the velocities of single views are known too badly, and freeing them
 /// costs more than it mends. What they do to the focal length differs from view to view: it averages out, and σ
 /// clustered by picture knows of it. A turn looks like another principal point, though, and hands turn the same way
-/// again: where `residual_share` is below 0.8, what the principal point would change by is added to its σ.
+/// again: where `residual_share` is below 0.8, what the principal point would change by is added to its σ, from 0.9 on
+/// a part of it.
 /// Said beside the result so that who wants better holds the device still.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RollingShutter {
@@ -350,6 +352,34 @@ pub struct Estimate {
     pub sigma: f64,
 }
 
+/// A camera that was calibrated before, and what that calibration knows of its own errors.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KnownCamera {
+    /// The camera.
+    pub camera: Camera,
+    /// As [`Calibration::parameters`]; none where the camera is taken as exact.
+    pub parameters: Vec<Parameter>,
+    /// As [`Calibration::covariance`].
+    pub covariance: Vec<f64>,
+    /// The focal length of both halves of its views, pixels.
+    pub split_half_focal_px: Option<[f64; 2]>,
+    /// What the factory says of the camera that was calibrated, where it says anything: a focal length, pixels.
+    pub factory_focal_px: Option<f64>,
+}
+
+impl KnownCamera {
+    /// A camera taken as exact.
+    pub const fn exact(camera: Camera) -> Self {
+        Self {
+            camera,
+            parameters: Vec::new(),
+            covariance: Vec::new(),
+            split_half_focal_px: None,
+            factory_focal_px: None,
+        }
+    }
+}
+
 /// One free parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameter {
@@ -357,6 +387,13 @@ pub struct Parameter {
     pub name: &'static str,
     /// Value and standard deviation.
     pub estimate: Estimate,
+}
+
+impl Parameter {
+    /// The name of a free number as [`Calibration::parameters`] has it; `None` for what no model calls so.
+    pub fn known_name(name: &str) -> Option<&'static str> {
+        model::NAMES.into_iter().find(|known| *known == name)
+    }
 }
 
 /// One model tried.
@@ -540,7 +577,7 @@ pub enum Error {
     /// Too few usable views.
     #[error(
         "{n_views} of {n_frames} frames show the board well enough (at least {min_corners} corners, spread in both \
-         directions); a calibration needs {needed} different views. Record 15 or more, tilted by 20° to 45° to all \
+         directions); a calibration needs {needed} different views. Record 20 or more, tilted by 20° to 45° to all \
          sides"
     )]
     TooFewViews {
@@ -555,8 +592,8 @@ pub enum Error {
     },
     /// Views that leave the focal length open.
     #[error(
-        "the {n_views} views ({n_pictures} different pictures, tilted by at most {max_tilt_deg:.0}°) do not determine \
-         the focal length{}. Record 15 or more views tilted by 20° to 45° to all sides",
+        "the {n_views} views ({n_pictures} different, tilted by at most {max_tilt_deg:.0}°) do not determine \
+         the focal length{}. Record 20 or more views tilted by 20° to 45° to all sides",
         focal_px.map_or(String::new(), |f| format!(" (it comes out as {:.0} ± {:.0} px)", f.value, f.sigma))
     )]
     Underdetermined {

@@ -110,6 +110,12 @@ pub(super) struct Shape<'a> {
     pub(super) surface: Surface,
 }
 
+const BROWN: [&str; 5] = ["k1", "k2", "p1", "p2", "k3"];
+
+/// What the free numbers of the [`Model`]s are called.
+pub(super) const NAMES: [&str; 9] =
+    ["focal_px", "center_x_px", "center_y_px", "aspect", "k1", "k2", "p1", "p2", "k3"];
+
 impl Shape<'_> {
     /// Names of the free numbers of the camera.
     pub(super) fn names(&self) -> Vec<&'static str> {
@@ -120,9 +126,9 @@ impl Shape<'_> {
         names.extend(match self.warp {
             Warp::None | Warp::Table(_) => &[][..],
             Warp::FreeTable(_) => &["table_amplitude"],
-            Warp::FreeRadial1 => &["k1"],
-            Warp::FreeRadial2 => &["k1", "k2"],
-            Warp::FreeBrown => &["k1", "k2", "p1", "p2", "k3"],
+            Warp::FreeRadial1 => &BROWN[..1],
+            Warp::FreeRadial2 => &BROWN[..2],
+            Warp::FreeBrown => &BROWN,
         });
         if self.aspect == Aspect::Free {
             names.push("aspect");
@@ -217,11 +223,10 @@ pub(super) fn brown(numbers: &[f64]) -> Brown {
     Brown::from_parameters(std::array::from_fn(|i| numbers.get(i).copied().unwrap_or(0.0)))
 }
 
-/// The camera with one of its free numbers moved by a step.
-pub(super) fn moved(camera: &Camera, name: &str, step: f64) -> Camera {
+/// The camera with a free number of its calibration changed. Numbers it does not know change nothing.
+pub(crate) fn moved(camera: &Camera, name: &str, step: f64) -> Camera {
     let mut camera = camera.clone();
     let pinhole = &mut camera.intrinsics;
-    let brown_number = ["k1", "k2", "p1", "p2", "k3"].iter().position(|k| *k == name);
     match name {
         "focal_px" => {
             let aspect = pinhole.fy / pinhole.fx;
@@ -233,6 +238,7 @@ pub(super) fn moved(camera: &Camera, name: &str, step: f64) -> Camera {
         "aspect" => pinhole.fy += step * pinhole.fx,
         _ => {}
     }
+    let brown_number = BROWN.iter().position(|k| *k == name);
     if let (Some(k), Distortion::Brown(lens)) = (brown_number, &mut camera.distortion) {
         let mut numbers = lens.parameters();
         numbers[k] += step;

@@ -461,6 +461,16 @@ fn tells_a_rolling_shutter() {
         let found = run(&frames, None, Method::Robust(Model::FocalCentre)).unwrap();
         let shutter = found.rolling_shutter.unwrap();
         assert!(shutter.residual_share < 0.8 && shutter.turn_sigma_rad > 3e-3, "{shutter:?}");
+        // One centre, one σ, whichever fit it is of.
+        let hypothesis = found.distortion.as_ref().expect("is tested").hypotheses[0].clone();
+        assert_eq!(hypothesis.lens, Lens::None);
+        for (name, k) in [("center_x_px", 0), ("center_y_px", 1)] {
+            let shift = shutter.center_shift_px.expect("is free")[k].abs();
+            let sigmas =
+                [found.parameter(name).expect("is free").sigma, hypothesis.center_px[k].sigma];
+            assert!(sigmas.iter().all(|sigma| *sigma >= shift), "{sigmas:?} {shift}");
+            assert!((sigmas[0] / sigmas[1] - 1.0).abs() < 0.1, "{sigmas:?}");
+        }
         squares += normalised(found.focal_px(), 531.0).powi(2) / 6.0;
     }
     assert!(squares < 3.0, "{squares}");

@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{
     board::CharucoBoard,
-    calibrate::{Calibration, Estimate, abreast, both},
+    calibrate::{BoardSurface, Estimate, Parameter, abreast, both},
     camera::Camera,
     geom::Pixel,
     pose::View,
@@ -100,9 +100,12 @@ pub struct RegisterInput<'a> {
     pub board: &'a CharucoBoard,
     /// The camera that the views were found with.
     pub camera: &'a Camera,
-    /// The calibration it comes from: its covariance and the board's surface enter; without, the camera is taken as
-    /// exact and the board as flat.
-    pub calibration: Option<&'a Calibration>,
+    /// The camera's free numbers with their σ; without any it is taken as exact.
+    pub parameters: &'a [Parameter],
+    /// Their covariance, row-major.
+    pub covariance: &'a [f64],
+    /// The board's shape; without, it is taken as flat.
+    pub surface: Option<&'a BoardSurface>,
     /// Views of the board, each with what the depth map of its frame says.
     pub views: &'a [(&'a View, &'a Patches)],
     /// Which pixel of the colour image a pixel of the depth map would show if the one were distorted and the other not:
@@ -156,9 +159,7 @@ const NOISE_GROWTH_PER_M: f64 = 2.2e-3;
 /// (the scale is wrong by as much), errors of the board's surface other than its plane, and what a wrong camera *model*
 /// does.
 pub fn register(input: &RegisterInput<'_>) -> Option<Registration> {
-    let RegisterInput { board, camera, calibration, views, other_state } = *input;
-    let surface = calibration.and_then(|c| c.surface.as_ref());
-    let parameters = calibration.map_or(&[][..], |c| &c.parameters);
+    let RegisterInput { board, camera, parameters, surface, views, other_state, .. } = *input;
     let moved = moved_cameras(camera, parameters);
     let only_views: Vec<&View> = views.iter().map(|(view, _)| *view).collect();
     let stances = stances(board, surface, camera, &moved, &only_views);
@@ -224,13 +225,13 @@ pub fn register(input: &RegisterInput<'_>) -> Option<Registration> {
     // Frames as the planes count them.
     let of_frame = |texture: usize| frames[texture].0.frame;
     let lens_share = scene.lens.as_ref().and_then(|_| {
-        let slopes = lens_by_slopes(&planes, &theta, &scene.relief, calibration)?;
+        let slopes = lens_by_slopes(&planes, &theta, &scene.relief, input)?;
         let seen = print_seen.as_ref().and_then(|seen| seen.with_lens.as_ref());
         let both = seen.and_then(|seen| join(&slopes, ZOOM, seen, of_frame));
         let (value, covariance) = both.map_or(slopes.found, |both| both.estimate);
         Some(Estimate { value: value[N], sigma: covariance[(N, N)].max(0.0).sqrt() })
     });
-    let slopes = Seen { found: (theta, with_camera(&step, calibration)), by_frame: step.by_frame };
+    let slopes = Seen { found: (theta, with_camera(&step, input)), by_frame: step.by_frame };
     let (imprint, both) =
         print_seen.map(|seen| (seen.imprint, join(&slopes, ZOOM, &seen.place, of_frame))).unzip();
     let witnesses =
@@ -497,14 +498,13 @@ fn noise_m(board_m: f64) -> f64 {
 /// Adds what the camera's own covariance does.
 fn with_camera<const M: usize>(
     step: &Step<M>,
-    calibration: Option<&Calibration>,
+    &RegisterInput { parameters, covariance: of_camera, .. }: &RegisterInput<'_>,
 ) -> SMatrix<f64, M, M> {
     let mut covariance = step.covariance;
-    let Some(calibration) = calibration else { return covariance };
-    let n = calibration.parameters.len();
-    let sigma = |k: usize| calibration.parameters[k].estimate.sigma;
+    let n = parameters.len();
+    let sigma = |k: usize| parameters[k].estimate.sigma;
     for (k, l) in (0..n).flat_map(|k| (0..n).map(move |l| (k, l))) {
-        let correlation = calibration.covariance[k * n + l] / (sigma(k) * sigma(l));
+        let correlation = of_camera[k * n + l] / (sigma(k) * sigma(l));
         if correlation.is_finite() {
             covariance.ger(correlation, &step.by_camera[k], &step.by_camera[l], 1.0);
         }
@@ -517,7 +517,7 @@ fn lens_by_slopes(
     planes: &[Plane],
     theta: &Numbers,
     relief: &Relief,
-    calibration: Option<&Calibration>,
+    input: &RegisterInput<'_>,
 ) -> Option<Seen<{ N + 1 }>> {
     let gains: Vec<_> = planes
         .iter()
@@ -530,7 +530,7 @@ fn lens_by_slopes(
         .collect();
     let theta = theta.push(0.0);
     let step = between_frames(planes, &gains, &theta, &Prior::new(relief.plane_covariance()))?;
-    let found = (theta + step.delta, with_camera(&step, calibration));
+    let found = (theta + step.delta, with_camera(&step, input));
     Some(Seen { found, by_frame: step.by_frame })
 }
 

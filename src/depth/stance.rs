@@ -4,8 +4,8 @@ use nalgebra::{Matrix3, Matrix3x6, Matrix6, Vector3, Vector6};
 
 use crate::{
     board::CharucoBoard,
-    calibrate::{BoardSurface, Parameter},
-    camera::{Brown, Camera, Distortion, TablePair},
+    calibrate::{BoardSurface, Parameter, moved},
+    camera::Camera,
     geom::{Board, Color, Pose},
     pose::{View, d_pixel_d_pose},
 };
@@ -37,40 +37,6 @@ pub(super) fn moved_cameras(camera: &Camera, parameters: &[Parameter]) -> Vec<[C
         .iter()
         .map(|p| [0.5, -0.5].map(|share| moved(camera, p.name, share * p.estimate.sigma)))
         .collect()
-}
-
-/// The camera with a free number of the calibration changed. Numbers it does not know change nothing.
-fn moved(camera: &Camera, name: &str, by: f64) -> Camera {
-    let mut moved = camera.clone();
-    let aspect = camera.intrinsics.fy / camera.intrinsics.fx;
-    match name {
-        "focal_px" => {
-            moved.intrinsics.fx += by;
-            moved.intrinsics.fy += by * aspect;
-        }
-        "center_x_px" => moved.intrinsics.cx += by,
-        "center_y_px" => moved.intrinsics.cy += by,
-        "table_amplitude" => {
-            if let Distortion::Table(tables) = &camera.distortion {
-                moved.distortion =
-                    Distortion::Table(TablePair::from_inverse(tables.inverse.scaled(1.0 + by)));
-            }
-        }
-        _ => {
-            let lens = match camera.distortion {
-                Distortion::Brown(lens) => Some(lens),
-                Distortion::None => Some(Brown::from_parameters([0.0; 5])),
-                Distortion::Table(_) => None,
-            };
-            let index = ["k1", "k2", "p1", "p2", "k3"].iter().position(|known| *known == name);
-            if let (Some(lens), Some(index)) = (lens, index) {
-                let mut numbers = [lens.k1, lens.k2, lens.p1, lens.p2, lens.k3];
-                numbers[index] += by;
-                moved.distortion = Distortion::Brown(Brown::from_parameters(numbers));
-            }
-        }
-    }
-    moved
 }
 
 struct Normal {

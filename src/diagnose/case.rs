@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     board::CharucoBoard,
-    calibrate::{Calibration, DistortionTest},
+    calibrate::{Calibration, DistortionTest, KnownCamera},
     camera::Camera,
     depth::{BoardDepth, DepthSteps, Handedness, Registration, TemporalNoise},
     detect::Observation,
@@ -39,6 +39,8 @@ pub struct Case<'a> {
     pub no_calibration: Option<&'a str>,
     /// The own camera, calibrated or given.
     pub camera: Option<&'a Camera>,
+    /// Where it is given: what is known of it.
+    pub given: Option<&'a KnownCamera>,
     /// The board's poses with the factory's intrinsics taken as an ideal pinhole.
     pub factory_views: &'a [&'a View],
     /// The board's poses with the own camera.
@@ -80,6 +82,7 @@ impl<'a> Case<'a> {
             calibration: None,
             no_calibration: None,
             camera: None,
+            given: None,
             factory_views: &[],
             own_views: &[],
             factory_depth: None,

@@ -37,8 +37,9 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
     } else {
         finding.verdict = Verdict::Info;
         finding.summary = format!(
-            "Frames usually follow each other every {usual_s:.3} s; there are {n_gaps} gaps, in which {n_lost:.0} \
-             frames would have fitted."
+            "Frames usually follow each other every {usual_s:.3} s; in {} {n_lost:.0} more would have \
+             fitted.",
+            if n_gaps == 1 { "one gap".to_owned() } else { format!("{n_gaps} gaps") }
         );
         finding.what_to_do =
             "Nothing for a calibration: each frame stands for itself. Whoever tracks through time \

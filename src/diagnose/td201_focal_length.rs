@@ -2,7 +2,7 @@
 
 use super::{Case, Code, Correction, DistortionState, Evidence, Finding, Unit, Verdict};
 use crate::{
-    calibrate::{Estimate, Lens},
+    calibrate::{Estimate, KnownCamera, Lens},
     camera::Distortion,
 };
 
@@ -19,6 +19,8 @@ pub(super) struct Measured {
     formal_sigma_px: Option<f64>,
     /// Half the difference of both halves of the views.
     split_half_sigma_px: Option<f64>,
+    /// The least and the greatest without any one picture, pixels; of the own camera's focal length alone.
+    left_out_px: Option<[f64; 2]>,
 }
 
 impl Measured {
@@ -45,25 +47,35 @@ enum Origin {
     Own,
     /// The own camera knows no distortion, the stream has some.
     DistortionTakenOut,
-    /// Given from outside, taken as exact.
+    /// Given from outside.
     Given,
 }
 
 pub(super) fn measure(case: &Case<'_>, state: DistortionState) -> Option<Measured> {
     let camera = case.camera?;
     let own_px = camera.intrinsics.focal_px();
+    // Each half has √2 the sigma of the whole, their difference twice: half of it is one draw of the whole's error.
+    let half_of = |[a, b]: [f64; 2]| (a - b).abs() / 2.0;
     let Some(calibration) = case.calibration else {
+        let focal = |given: &KnownCamera| {
+            given.parameters.iter().find(|p| p.name == "focal_px").map(|p| p.estimate.sigma)
+        };
+        let formal = case.given.and_then(focal);
+        let split_half = case.given.and_then(|given| given.split_half_focal_px).map(half_of);
+        // Nothing known of its errors: taken as exact.
+        let sigma = formal.map_or(0.0, |formal| formal.max(split_half.unwrap_or(0.0)));
         return Some(Measured {
-            focal_px: Estimate { value: own_px, sigma: 0.0 },
+            focal_px: Estimate { value: own_px, sigma },
             own_px,
             origin: Origin::Given,
-            formal_sigma_px: None,
-            split_half_sigma_px: None,
+            formal_sigma_px: formal,
+            split_half_sigma_px: split_half.filter(|_| formal.is_some()),
+            left_out_px: None,
         });
     };
     let formal = calibration.parameter("focal_px").map(|f| f.sigma);
-    // Each half has √2 the sigma of the whole, their difference twice: half of it is one draw of the whole's error.
-    let split_half = calibration.split_half_focal_px.map(|[a, b]| (a.value - b.value).abs() / 2.0);
+    let halves = calibration.split_half_focal_px.map(|halves| halves.map(|half| half.value));
+    let split_half = halves.map(half_of);
     let bent = state == DistortionState::Distorted && camera.distortion == Distortion::None;
     let straightened = || {
         let hypotheses = &case.distortion?.hypotheses;
@@ -74,6 +86,11 @@ pub(super) fn measure(case: &Case<'_>, state: DistortionState) -> Option<Measure
         Some(under) => (under.value, Some(under.sigma), Origin::DistortionTakenOut),
         None => (own_px, formal, Origin::Own),
     };
+    let without =
+        calibration.left_out.iter().map(|picture| picture.focal_px * own_px / camera.intrinsics.fx);
+    let left_out_px = (origin == Origin::Own && !calibration.left_out.is_empty()).then(|| {
+        [without.clone().fold(f64::INFINITY, f64::min), without.fold(f64::NEG_INFINITY, f64::max)]
+    });
     // The worse of both: halves see errors that vary over the recording. With neither nothing is known.
     let sigma = [formal, split_half].into_iter().flatten().fold(f64::NAN, f64::max);
     Some(Measured {
@@ -82,13 +99,14 @@ pub(super) fn measure(case: &Case<'_>, state: DistortionState) -> Option<Measure
         origin,
         formal_sigma_px: formal,
         split_half_sigma_px: split_half,
+        left_out_px,
     })
 }
 
 pub(super) fn check(case: &Case<'_>, measured: Option<&Measured>) -> Finding {
     let mut finding = Finding::new(Code::TD201, Unit::Percent);
     finding.tolerance = Some(100.0 * case.tolerances.focal);
-    let record = "Record 20 or more frames moving round the board, tilted by 20 to 40 degrees in different directions: \
+    let record = "Record 20 or more frames moving round the board, tilted by 20 to 45 degrees in different directions: \
                   from fronto-parallel views alone focal length and distance cannot be told apart.";
     let factory_px = case.factory.map(|f| f.intrinsics.focal_px());
     if let Some(why) = case.poor_fit() {
@@ -115,7 +133,8 @@ pub(super) fn check(case: &Case<'_>, measured: Option<&Measured>) -> Finding {
     finding.verdict = Verdict::of(difference, case.tolerances.focal);
     let (percent, percent_sigma) = (100.0 * difference.value, 100.0 * difference.sigma);
     finding.value = Some(percent);
-    finding.sigma = (measured.origin != Origin::Given).then_some(percent_sigma);
+    let is_exact = measured.origin == Origin::Given && measured.formal_sigma_px.is_none();
+    finding.sigma = (!is_exact).then_some(percent_sigma);
     finding.evidence = vec![
         Evidence::number("factory_focal_px", factory_px),
         Evidence { name: "focal_px", value: focal_px, sigma: finding.sigma.map(|_| sigma_px) },
@@ -123,20 +142,26 @@ pub(super) fn check(case: &Case<'_>, measured: Option<&Measured>) -> Finding {
     for (name, value) in [
         ("sigma_of_fit_px", measured.formal_sigma_px),
         ("sigma_from_halves_px", measured.split_half_sigma_px),
+        ("least_without_a_picture_px", measured.left_out_px.map(|[low, _]| low)),
+        ("most_without_a_picture_px", measured.left_out_px.map(|[_, high]| high)),
     ] {
         finding.evidence.extend(value.map(|value| Evidence::number(name, value)));
     }
     let how = match measured.origin {
-        Origin::Given => "given from outside and taken as exact".to_owned(),
+        Origin::Given if is_exact => "given from outside and taken as exact".to_owned(),
+        Origin::Given => format!("given from outside, sigma {}", measured.sigmas()),
         Origin::Own => {
-            format!("measured against the board, sigma the larger of {}", measured.sigmas())
+            let without = measured.left_out_px.map_or(String::new(), |[low, high]| {
+                format!("; without any one picture {low:.2} to {high:.2} px")
+            });
+            format!("measured against the board, sigma {}{without}", measured.sigmas())
         }
         Origin::DistortionTakenOut => {
             finding
                 .evidence
                 .push(Evidence::number("focal_with_distortion_left_in_px", measured.own_px));
             format!(
-                "measured with the stream's distortion taken out ({:.2} px with it left in), sigma the larger of {}",
+                "measured with the stream's distortion taken out ({:.2} px with it left in), sigma {}",
                 measured.own_px,
                 measured.sigmas()
             )
@@ -144,7 +169,7 @@ pub(super) fn check(case: &Case<'_>, measured: Option<&Measured>) -> Finding {
     };
     // A σ that two decimals would call nothing has three.
     let decimals = if percent_sigma < 0.01 { 3 } else { 2 };
-    let (decimals, spread) = if measured.origin == Origin::Given {
+    let (decimals, spread) = if is_exact {
         (2, String::new())
     } else if percent_sigma < 5e-4 {
         (decimals, " +- less than 0.001".to_owned())
@@ -183,13 +208,16 @@ pub(super) fn check(case: &Case<'_>, measured: Option<&Measured>) -> Finding {
 
 impl Measured {
     fn sigmas(&self) -> String {
-        [
-            ("the fit's own", self.formal_sigma_px),
-            ("half the difference of both halves", self.split_half_sigma_px),
-        ]
-        .into_iter()
-        .filter_map(|(name, sigma)| Some(format!("{name} {:.2} px", sigma?)))
-        .collect::<Vec<_>>()
-        .join(", ")
+        let known = |sigma: Option<f64>| sigma.map(|sigma| format!("{sigma:.2} px"));
+        match (known(self.formal_sigma_px), known(self.split_half_sigma_px)) {
+            (Some(fit), Some(halves)) => {
+                format!(
+                    "the larger of the fit's own {fit}, half the difference of both halves {halves}"
+                )
+            }
+            (Some(fit), None) => format!("the fit's own {fit}; no two halves to compare"),
+            (None, Some(halves)) => format!("half the difference of both halves {halves}"),
+            (None, None) => "not known".to_owned(),
+        }
     }
 }

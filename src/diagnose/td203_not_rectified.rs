@@ -4,7 +4,7 @@ use super::{Case, Code, Correction, DistortionState, Evidence, Finding, Unit, Ve
 use crate::calibrate::{DistortionTest, Estimate, Lens};
 
 /// What to record to be able to tell.
-pub(super) const RECORD: &str = "Record at least 10 frames with the board tilted by 20 to 40 degrees in different \
+pub(super) const RECORD: &str = "Record 20 or more frames with the board tilted by 20 to 45 degrees in different \
                                  directions and reaching into the corners of the image.";
 
 /// A table is in the stream, is not, or was applied twice: halfway to the next of these it stops being one.
@@ -114,7 +114,7 @@ fn of_depth(state: DistortionState, depth: DistortionState, share: Option<Estima
         _ => "Depth is not as colour is",
     };
     format!(
-        " {how}: of the way from colour's state to the other one depth has gone {:.0} % +- {:.0} %.",
+        " {how} (0 % is colour's state, 100 % the other one: {:.0} % +- {:.0} %).",
         (100.0 * value).round() + 0.0, // no "-0"
         100.0 * sigma
     )

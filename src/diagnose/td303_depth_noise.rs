@@ -5,6 +5,8 @@ use crate::depth::{STILL_PX, TemporalNoise};
 
 /// Share of holes within the sensor's reach beyond which a recording is short of depth, percent.
 const MANY_HOLES_PERCENT: f64 = 10.0;
+/// Holes are judged where at least this share of the board's pixels is within reach.
+const LEAST_IN_REACH: f64 = 0.2;
 /// Noise of single pixels of a sound sensor: σ² = floor² + (z²·growth)², measured on the published recordings.
 const FLOOR_M: f64 = 0.17e-3;
 const GROWTH_PER_M: f64 = 2.2e-3;
@@ -28,7 +30,8 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
     let expected_m = FLOOR_M.hypot(found.center_m * found.center_m * GROWTH_PER_M);
     let times = pattern.pixel_noise_m / expected_m;
     let holes = &pattern.holes;
-    let share = holes.share_in_reach();
+    let in_reach = holes.n_pixels_in_reach as f64 / holes.n_pixels.max(1) as f64;
+    let share = holes.share_in_reach().filter(|_| in_reach >= LEAST_IN_REACH);
     finding.value = share.map(|share| 100.0 * share);
     finding.evidence = vec![
         Evidence::number("pixel_noise_mm", 1e3 * pattern.pixel_noise_m),
@@ -52,7 +55,13 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
     let noisy = times > MUCH;
     let torn = share.is_some_and(|share| 100.0 * share > MANY_HOLES_PERCENT);
     let gaps = share.map_or_else(
-        || "the board was never within 0.2 m and 60 degrees".to_owned(),
+        || {
+            format!(
+                "only {:.0} % of the board's pixels were farther than 0.2 m and nearer than 60 degrees, too few to \
+                 judge its holes",
+                100.0 * in_reach
+            )
+        },
         |share| format!("{:.2} % of the pixels on the board within reach are holes", 100.0 * share),
     );
     finding.summary = format!(

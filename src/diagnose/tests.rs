@@ -205,7 +205,9 @@ impl World {
             register(&RegisterInput {
                 board: &BOARD,
                 camera,
-                calibration: None,
+                parameters: &[],
+                covariance: &[],
+                surface: None,
                 views: &pairs,
                 other_state: None,
             })
@@ -237,6 +239,7 @@ impl World {
             calibration: calibration.as_ref(),
             no_calibration: None,
             camera: self.own.as_ref(),
+            given: None,
             factory_views: &factory_views.iter().collect::<Vec<_>>(),
             own_views: &own_views.iter().collect::<Vec<_>>(),
             factory_depth: Some(&factory_depth),

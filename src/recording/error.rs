@@ -35,7 +35,7 @@ pub enum Error {
         names: Vec<String>,
     },
     /// A file that cannot be read or written.
-    #[error("{file}: {why}; check that it is there, is a file, and that you have the right to it")]
+    #[error("{file}: {why}; check that it is there, and that you have the right to it")]
     File {
         /// The file.
         file: String,

@@ -4,6 +4,7 @@ use super::svg::minus;
 use crate::{
     audit::Audit,
     calibrate::{Estimate, Model},
+    depth::BoardDepth,
     diagnose::{Code, DistortionState, Finding, Sensor, Unit, Verdict},
 };
 
@@ -58,10 +59,10 @@ pub(super) fn rows(audit: &Audit) -> Vec<Row> {
     };
     if audit.factory_depth.is_some() || audit.own_depth.is_some() {
         let depth_row = Row {
-            quantity: "Depth error".to_owned(),
+            quantity: "Depth error (board − sensor)".to_owned(),
             factory: error(audit.factory_depth.as_ref()),
             measured: error(audit.own_depth.as_ref()),
-            difference: String::new(),
+            difference: frames_that_count(audit),
             verdict: None,
         };
         // Beside the other checks of the depth.
@@ -70,6 +71,20 @@ pub(super) fn rows(audit: &Audit) -> Vec<Row> {
         rows.insert(at.unwrap_or(rows.len()), depth_row);
     }
     rows
+}
+
+/// In how many frames the depth error was compared, where some had nothing but errors beyond
+/// [`MAX_ERROR_M`](crate::depth::MAX_ERROR_M).
+fn frames_that_count(audit: &Audit) -> String {
+    let of = |depth: &BoardDepth| {
+        (depth.frames.iter().filter(|f| f.median_error_m.is_some()).count(), depth.frames.len())
+    };
+    match (audit.factory_depth.as_ref().map(of), audit.own_depth.as_ref().map(of)) {
+        (Some((a, n)), Some((b, m))) if n == m && (a, b) != (n, n) => {
+            format!("in {a} and {b} of {n} frames")
+        }
+        _ => String::new(),
+    }
 }
 
 fn row(audit: &Audit, finding: &Finding) -> Row {
@@ -142,18 +157,31 @@ fn row(audit: &Audit, finding: &Finding) -> Row {
         }
         _ => (String::new(), fact(finding)),
     };
-    Row {
-        quantity: finding.title().to_owned(),
-        factory,
-        measured,
-        difference,
-        verdict: Some((finding.code, finding.verdict)),
-    }
+    let is_judged =
+        |e: Estimate| judged.is_some_and(|judged| (judged.value - e.value).abs() < 1e-9);
+    let quantity = match finding.code {
+        Code::TD301 if named("ratio_at_center").is_some_and(|r| is_judged(as_percent(r))) => {
+            "Depth scale (mean ratio)".to_owned()
+        }
+        Code::TD302 => match named("offset_at_center_m").zip(named("center_m")) {
+            Some((offset, center)) if is_judged(in_mm(offset)) => {
+                format!("Depth bias at {} m (sensor − board)", plain(center.value, 2))
+            }
+            _ => "Depth bias (sensor − board)".to_owned(),
+        },
+        _ => finding.title().to_owned(),
+    };
+    Row { quantity, factory, measured, difference, verdict: Some((finding.code, finding.verdict)) }
 }
 
 /// A deviation in percent as a factor.
 fn as_scale(percent: Estimate) -> Estimate {
     Estimate { value: 1.0 + percent.value / 100.0, sigma: percent.sigma / 100.0 }
+}
+
+/// A factor as a deviation in percent.
+fn as_percent(scale: Estimate) -> Estimate {
+    Estimate { value: 100.0 * (scale.value - 1.0), sigma: 100.0 * scale.sigma }
 }
 
 /// A value that is no deviation: a number of things, an angle.

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::{
     audit::{self, Audit, Method, Options, audit},
-    calibrate::Estimate,
+    calibrate::{Estimate, KnownCamera},
     correct::{Rectifier, Straightness, StreamState, Treatment, board_lines},
     diagnose::{Entry, Registry, Sheet},
 };
@@ -91,7 +91,8 @@ pub fn reproduce(
             .find(|c| one.device.is_some() && data[c.data].device == one.device)
             .and_then(|c| c.paper.camera.clone());
         let has_own = own.is_some();
-        let method = own.map_or(Method::Paper, |camera| Method::Given(Box::new(camera)));
+        let method =
+            own.map_or(Method::Paper, |camera| Method::Given(Box::new(KnownCamera::exact(camera))));
         let audit = Box::new(audit(&one.recording, &Options::new(method))?);
         depth.push(DepthEvaluation { data: index, title: title(one), audit, has_own });
     }

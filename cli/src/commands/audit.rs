@@ -70,7 +70,7 @@ pub(crate) fn run(args: &AuditArgs, terminal: &Terminal) -> Result<Outcome, Fail
 /// What was typed, as the library understands it.
 fn options(args: &AuditArgs) -> Result<Options, Failure> {
     let method = match (&args.calibration, args.method) {
-        (Some(path), _) => Method::Given(Box::new(input::camera(path)?)),
+        (Some(path), _) => Method::Given(Box::new(input::known_camera(path)?)),
         (None, args::Method::Auto) => Method::Auto,
         (None, args::Method::Paper) => Method::Paper,
     };
@@ -130,6 +130,17 @@ fn one(
     terminal.detail(&format!("{}: {} frames", recording.place(), recording.frames.len()));
     let thumbnails = folder.as_ref().map(|_| Thumbnails::new(&recording));
     let audit = watched(&recording, options, thumbnails.as_ref(), terminal)?;
+    if let (Some(said), Some(seen)) =
+        (options.board.as_ref().and_then(|board| board.layout), audit.layout)
+        && said != seen
+    {
+        terminal.warn(&format!(
+            "{}: the board given has the layout `{}`, the one in the images is `{}`: taken as seen",
+            audit.name,
+            said.name(),
+            seen.name()
+        ));
+    }
     let json = report::to_json(&wire::Document::Audit(Box::new(wire::Audit::from(&audit))));
     let report = folder.as_ref().map(|folder| folder.json().display().to_string());
     let typed = Typed { recording: recording_typed, report };

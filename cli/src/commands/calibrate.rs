@@ -28,8 +28,14 @@ use crate::{
 pub(crate) fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome, Failure> {
     let format = args.export.as_deref().map(|file| format_of(file, args.format)).transpose()?;
     let seen = look(args, terminal)?;
-    let (name, calibration) = measure(&seen, method(args, &seen), args.views)?;
-    let named = if matches!(args.method, args::Method::Paper) { "paper" } else { "auto" };
+    let method = method(args, &seen);
+    let named = match method {
+        Method::Paper => "paper",
+        Method::Auto | Method::Unaided => "auto",
+        Method::Robust(_) => "model",
+        Method::Plain(_) => "plain",
+    };
+    let (name, calibration) = measure(&seen, method, args.views)?;
     let document = wire::Calibration::new(&name, named, seen.factory.as_ref(), &calibration);
     if let (Some(file), Some(format)) = (&args.export, format) {
         write(file, format, &document, args, terminal)?;
@@ -38,7 +44,15 @@ pub(crate) fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome, 
         let document = wire::Document::Calibrate(Box::new(document));
         terminal.result(&report::to_json(&document))?;
     } else {
-        terminal.result(&table(&document))?;
+        terminal.result(&table(&document, seen.n_images))?;
+    }
+    if 2 * seen.frames.len() < seen.n_images {
+        terminal.warn(&format!(
+            "the board was found in {} of {} images: look at what is seen of it with `truedepth detect`, and check \
+             --board",
+            seen.frames.len(),
+            seen.n_images
+        ));
     }
     if let Some(sigma_px) = calibration.unknown_px() {
         let missing = coverage(&seen.views(&seen.start())).advice();
@@ -56,7 +70,9 @@ struct Seen {
     board: CharucoBoard,
     factory: Option<Factory>,
     size_px: [usize; 2],
+    /// Those with corners.
     frames: Vec<FrameCorners>,
+    n_images: usize,
 }
 
 impl Seen {
@@ -109,9 +125,10 @@ fn look(args: &CalibrateArgs, terminal: &Terminal) -> Result<Seen, Failure> {
                 .filter(|i| recording.frames[*i].color.is_some())
                 .collect();
             let gray = |index: &usize| Ok(recording.gray(*index)?);
+            let n_images = frames.len();
             let (frames, size_px) = corners(&recording.name, &board, &frames, terminal, gray)?;
             let factory = recording.factory().cloned();
-            Ok(Seen { name: recording.name.clone(), board, factory, size_px, frames })
+            Ok(Seen { name: recording.name.clone(), board, factory, size_px, frames, n_images })
         }
         Input::Images(files) => {
             let board = known(None, &place)?;
@@ -125,7 +142,7 @@ fn look(args: &CalibrateArgs, terminal: &Terminal) -> Result<Seen, Failure> {
                 args.recording.file_name().unwrap_or_default().to_string_lossy().into_owned();
             let all: Vec<usize> = (0..files.len()).collect();
             let (frames, size_px) = corners(&name, &board, &all, terminal, gray)?;
-            Ok(Seen { name, board, factory: None, size_px, frames })
+            Ok(Seen { name, board, factory: None, size_px, frames, n_images: all.len() })
         }
     }
 }
@@ -230,7 +247,7 @@ fn write(
         Some(format) => {
             let exported = export::calibration(&document.camera()?, &document.recording, format);
             if let Some(residual) = exported.residual {
-                terminal.say(&format!(
+                terminal.warn(&format!(
                     "{}: {} does not hold this lens; the one written differs by {:.3} px (RMS; at most {:.3} px)",
                     file.display(),
                     format.name(),
@@ -249,22 +266,35 @@ fn write(
 
 type Row = (&'static str, String);
 
+/// So many of something.
+fn count(n: usize, what: &str) -> String {
+    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
+}
+
 /// What a person wants to know, in columns.
-fn table(calibration: &wire::Calibration) -> String {
+fn table(calibration: &wire::Calibration, n_images: usize) -> String {
+    let how = match calibration.method.as_str() {
+        "paper" => "--method paper",
+        "auto" => "--method auto",
+        "plain" => "--model, as OpenCV's calibrateCamera",
+        _ => "--model",
+    };
     let mut rows = vec![
         ("recording", calibration.recording.clone()),
-        ("model", format!("{} (--method {})", calibration.model, calibration.method)),
+        ("model", format!("{} ({how})", calibration.model)),
     ];
     rows.extend(camera_rows(calibration));
+    let without = n_images.saturating_sub(calibration.n_views + calibration.rejected.len());
     rows.push((
         "fit",
         format!(
-            "rms {:.3} px over {} corners of {} views, {} outliers and {} frames left out",
+            "rms {:.3} px over {} corners of {} views; of {}, {without} without the board and {} not used; {} left out",
             calibration.rms_px,
             calibration.n_corners,
             calibration.n_views,
-            calibration.outliers.len(),
+            count(n_images, "image"),
             calibration.rejected.len(),
+            count(calibration.outliers.len(), "outlier"),
         ),
     ));
     if let Some(chosen) = &calibration.chosen {
@@ -274,8 +304,10 @@ fn table(calibration: &wire::Calibration) -> String {
         rows.push((
             "views chosen",
             format!(
-                "the {} that tell most, of {} ({} different pictures){cost} (--views N)",
-                chosen.n_chosen, chosen.n_usable, chosen.n_pictures
+                "the {} that tell most, of {} ({}){cost} (--views N)",
+                chosen.n_chosen,
+                chosen.n_usable,
+                count(chosen.n_pictures, "different picture")
             ),
         ));
     }
@@ -285,7 +317,7 @@ fn table(calibration: &wire::Calibration) -> String {
         rows.push((
             if i == 0 { "models tried" } else { "" },
             format!(
-                "{:<18}  rms {} px, held out {} px, focal length {}",
+                "{:<18}  rms {} px, held out {} px, focal length {} px",
                 candidate.model,
                 number(candidate.rms_px),
                 held_out(candidate.held_out_rms_px, candidate.held_out_sigma_px),
@@ -297,7 +329,7 @@ fn table(calibration: &wire::Calibration) -> String {
         rows.push((
             if i == 0 { "boards tried" } else { "" },
             format!(
-                "{:<18}  rms {} px, held out {} px, focal length {}",
+                "{:<18}  rms {} px, held out {} px, focal length {} px",
                 surface.kind,
                 number(surface.rms_px),
                 held_out(surface.held_out_rms_px, surface.held_out_sigma_px),
@@ -322,12 +354,18 @@ fn camera_rows(calibration: &wire::Calibration) -> Vec<Row> {
     }
     let sigma_of =
         |name: &str| calibration.parameters.iter().find(|p| p.name == name).and_then(|p| p.sigma);
+    let is_free = calibration.parameters.iter().any(|p| p.name == "center_x_px");
+    let fixed = match (is_free, calibration.factory_focal_px) {
+        (true, _) => "",
+        (false, Some(_)) => " (the factory's, not measured)",
+        (false, None) => " (not measured)",
+    };
     let [x, y] = calibration.principal_point_px;
     let center = [(x, "center_x_px"), (y, "center_y_px")]
         .map(|(value, name)| with_sigma(value, sigma_of(name), 2));
     let mut rows = vec![
         ("focal length", focal),
-        ("principal point", format!("({}, {}) px", center[0], center[1])),
+        ("principal point", format!("({}, {}) px{fixed}", center[0], center[1])),
     ];
     for parameter in &calibration.parameters {
         if !parameter.name.ends_with("_px") {
@@ -376,14 +414,21 @@ fn stability_rows(calibration: &wire::Calibration) -> Vec<Row> {
         ..
     }) = &calibration.rolling_shutter
     {
-        let words = if *share < 0.8 { "hold the device still" } else { "hardly anything moved" };
-        rows.push((
-            "rolling shutter",
+        let percent = 100.0 * share;
+        let words = if *share < 0.8 {
             format!(
-                "residuals fall to {:.0} % if views may move while read, focal length by {shift:+.2} px ({words})",
-                100.0 * share
-            ),
-        ));
+                "views moved while read: with velocities residuals fall to {percent:.0} %, and the focal length would \
+                 be {shift:+.2} px off; hold the device still"
+            )
+        } else if *share < 0.95 {
+            format!(
+                "views moved a little while read: with velocities residuals fall to {percent:.0} %, and the focal \
+                 length would be {shift:+.2} px off"
+            )
+        } else {
+            format!("none: velocities while read leave residuals at {percent:.0} %")
+        };
+        rows.push(("rolling shutter", words));
     }
     if let Some(grid) = &calibration.projection_uncertainty {
         let sigmas: Vec<f64> = grid.sigma_px.iter().copied().flatten().collect();
@@ -391,10 +436,17 @@ fn stability_rows(calibration: &wire::Calibration) -> Vec<Row> {
         rows.push((
             "projection",
             format!(
-                "± {:.2} px in the middle, ± {:.2} px at worst, for points {:.2} m away",
+                "± {:.2} px in the middle, ± {:.2} px at worst, for points {:.2} m away{}",
                 at(grid.sigma_px.len() / 2),
                 sigmas.iter().copied().fold(0.0, f64::max),
-                grid.depth_m
+                grid.depth_m,
+                match grid.sigma_px.len() - sigmas.len() {
+                    0 => String::new(),
+                    n => format!(
+                        "; {:.0} % of the image is beyond the lens model",
+                        100.0 * n as f64 / grid.sigma_px.len() as f64
+                    ),
+                }
             ),
         ));
     }

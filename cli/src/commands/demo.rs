@@ -64,7 +64,8 @@ pub(crate) fn run(args: &DemoArgs, terminal: &Terminal) -> Result<Outcome, Failu
     let flags: Vec<String> = faults.iter().map(|fault| format!("--fault {fault}")).collect();
     terminal.say(&format!("\nthe report:    {}", file_url(&folder.html())));
     terminal.say(&format!(
-        "the recording: truedepth simulate --device {DEVICE} {} --frames {} --seed {} -o {RECORDING}",
+        "the recording, which the commands above want:\n               \
+         truedepth simulate --device {DEVICE} {} --frames {} --seed {} -o {RECORDING}",
         flags.join(" "),
         plan.n_frames,
         plan.seed

@@ -151,8 +151,29 @@ fn a_simulated_fault_is_found_whatever_the_number_of_threads() {
         truedepth_in(scratch.path(), ["audit", "rec", "--json", "--calibration", "camera.json"]);
     let given = json(&given.stdout);
     assert!(given["calibration"].is_null(), "nothing is calibrated where a camera is given");
+    // What the calibration knows of its errors is known to the audit.
+    let sigma_of = |report: &Value, code: &str| {
+        let findings = report["findings"].as_array().expect("findings");
+        let finding = findings.iter().find(|f| f["code"] == code).expect("is checked");
+        finding["sigma"].as_f64().expect("a sigma")
+    };
+    for code in ["TD201", "TD301", "TD401"] {
+        let ratio = sigma_of(&given, code) / sigma_of(&report, code);
+        assert!((0.5..2.0).contains(&ratio), "{code}: {ratio}");
+    }
+    let other = run.stdout.replace("\"factory_focal_px\": ", "\"factory_focal_px\": 1");
+    scratch.write("other.json", &other);
+    truedepth_in(scratch.path(), ["audit", "rec", "--json", "--calibration", "other.json"])
+        .code(1)
+        .says(&["of another camera"]);
     let error = |report: &Value| report["depth"]["own_median_error_mm"].as_f64().expect("depth");
     assert!((error(&given) - error(&report)).abs() < 0.1, "{} {}", error(&given), error(&report));
+
+    // A layout that the images contradict.
+    let board = "10x8:20.875mm:10.4375mm:ARUCO_ORIGINAL:new";
+    let run = truedepth_in(scratch.path(), ["audit", "rec", "--json", "-q", "--board", board])
+        .says(&["taken as seen"]);
+    assert_eq!(json(&run.stdout), report);
 
     // Corners are where they truly are.
     let run = truedepth_in(scratch.path(), ["detect", "rec", "--json", "--timings"]).code(0);

@@ -183,7 +183,7 @@ fn an_unreadable_file() {
         let recording = scratch.blank_recording("rec");
         fs::remove_file(recording.join(file)).expect("it was there");
         fs::create_dir(recording.join(file)).expect("it is gone");
-        refused(&recording, &[file, "check that it is there, is a file"]);
+        refused(&recording, &[file, "check that it is there, and that"]);
     }
 }
 

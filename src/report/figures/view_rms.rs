@@ -21,13 +21,10 @@ pub(in crate::report) fn rms_by_view(audit: &Audit) -> Option<Figure> {
             let rms = |view: Option<&crate::pose::View>| {
                 view.map(|v| v.rms_px).filter(|rms| rms.is_finite())
             };
-            // The calibration's own views know the board's shape.
-            let calibrated =
-                audit.calibration.iter().flat_map(|c| &c.views).find(|view| view.frame == frame);
             (
                 frame,
                 rms(f.factory_view.as_ref()),
-                rms(calibrated.or(f.own_view.as_ref())),
+                rms(f.own_view.as_ref()),
                 f.observation.corners.len(),
             )
         })
@@ -63,7 +60,8 @@ pub(in crate::report) fn rms_by_view(audit: &Audit) -> Option<Figure> {
         id: "views",
         title: "How well each view fits".to_owned(),
         caption: "Distance between the corners as seen and as the camera model predicts them. One tall bar is a \
-                  blurred or wrong view; tall bars throughout are a wrong model or a board that is not flat."
+                  blurred or wrong view; tall bars throughout are a wrong model or a board that is not flat. With the \
+                  factory's intrinsics the board is taken for flat; with the own ones it has the shape that was found."
             .to_owned(),
         legend: vec![
             Key { class: "series-own square", words: "own intrinsics" },

@@ -333,9 +333,9 @@ pub struct Frame {
     pub n_corners: usize,
     /// Candidates not taken.
     pub n_rejected: usize,
-    /// Of the pose with the factory's intrinsics.
+    /// Of the pose with the factory's intrinsics, the board taken for flat.
     pub factory_rms_px: Option<f64>,
-    /// Of the pose with the own camera.
+    /// Of the pose with the own camera, against the board's shape where the calibration found one.
     pub own_rms_px: Option<f64>,
     /// Fraction of the depth map without measurement.
     pub holes: Option<f64>,

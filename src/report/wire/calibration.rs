@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{finite, model_name};
 use crate::{
-    calibrate::{self, Estimate, Lens},
+    calibrate::{self, Estimate, KnownCamera, Lens},
     camera::{self, Brown, Camera, Intrinsics, RadialTable, TablePair},
     geom::Pixel,
     pose,
@@ -17,7 +17,7 @@ use crate::{
 pub struct Calibration {
     /// Name of the recording.
     pub recording: String,
-    /// `paper` or `auto`.
+    /// `paper`, `auto`, `model` where the model was asked for, or `plain` where that was fitted as OpenCV does.
     pub method: String,
     /// `focal`, `focal+table`, `focal+centre`, `focal+table+centre` or `brown`.
     pub model: String,
@@ -321,7 +321,7 @@ pub struct Table {
 }
 
 impl Calibration {
-    /// What was calibrated from `recording` by `method` (`paper` or `auto`), beside what the factory says.
+    /// What was calibrated from `recording` by [`method`](Self::method), beside what the factory says.
     pub fn new(
         recording: &str,
         method: &str,
@@ -333,6 +333,8 @@ impl Calibration {
         let focal_sigma =
             calibration.parameters.iter().find(|p| p.name == "focal_px").map(|p| p.estimate.sigma);
         let factory_focal = factory.map(|f| f.intrinsics.focal_px());
+        // The fit's own number is the horizontal one.
+        let mean = focal / intrinsics.fx;
         let halves = calibration.split_half_focal_px;
         let n = calibration.parameters.len();
         Self {
@@ -340,7 +342,7 @@ impl Calibration {
             method: method.to_owned(),
             model: model_name(calibration.model).to_owned(),
             focal_px: focal,
-            focal_sigma_px: focal_sigma.and_then(finite),
+            focal_sigma_px: focal_sigma.and_then(|sigma| finite(mean * sigma)),
             factory_focal_px: factory_focal,
             focal_difference_percent: factory_focal
                 .map(|factory| 100.0 * (focal / factory - 1.0))
@@ -353,8 +355,9 @@ impl Calibration {
             n_views: calibration.views.len(),
             n_pictures: calibration.n_pictures,
             n_corners: calibration.views.iter().map(|view| view.corners.len()).sum(),
-            split_half_focal_px: halves.map(|halves| halves.map(|half| half.value)),
-            split_half_focal_sigma_px: halves.map(|halves| halves.map(|half| finite(half.sigma))),
+            split_half_focal_px: halves.map(|halves| halves.map(|half| mean * half.value)),
+            split_half_focal_sigma_px: halves
+                .map(|halves| halves.map(|half| finite(mean * half.sigma))),
             parameters: calibration.parameters.iter().map(Parameter::from).collect(),
             covariance: calibration
                 .covariance
@@ -377,7 +380,7 @@ impl Calibration {
             left_out: calibration
                 .left_out
                 .iter()
-                .map(|l| LeftOut { frames: l.frames.clone(), focal_px: finite(l.focal_px) })
+                .map(|l| LeftOut { frames: l.frames.clone(), focal_px: finite(mean * l.focal_px) })
                 .collect(),
             rolling_shutter: calibration.rolling_shutter.map(|shutter| RollingShutter {
                 turn_sigma_mrad: finite(1e3 * shutter.turn_sigma_rad),
@@ -418,6 +421,46 @@ impl Calibration {
         let intrinsics = Intrinsics { fx, fy, cx, cy, width, height };
         let distortion = camera::Distortion::try_from(&self.distortion)?;
         Ok(Camera { intrinsics, distortion })
+    }
+}
+
+impl Calibration {
+    /// The camera with what this calibration knows of its errors.
+    ///
+    /// Refused: as [`camera`](Self::camera), and a covariance that is not one of the parameters.
+    pub fn known(&self) -> Result<KnownCamera, Error> {
+        let camera = self.camera()?;
+        let refused = |what: String| Err(Error::Camera(what));
+        let mut parameters = Vec::new();
+        for parameter in &self.parameters {
+            let (Some(name), Some(sigma)) =
+                (calibrate::Parameter::known_name(&parameter.name), parameter.sigma)
+            else {
+                return refused(format!("a number {} without a σ, or unknown", parameter.name));
+            };
+            let estimate = Estimate { value: parameter.value, sigma };
+            parameters.push(calibrate::Parameter { name, estimate });
+        }
+        let n = parameters.len();
+        let covariance: Option<Vec<f64>> = self.covariance.iter().flatten().copied().collect();
+        let is_square =
+            self.covariance.len() == n && self.covariance.iter().all(|row| row.len() == n);
+        let is_right = |covariance: &[f64]| {
+            parameters.iter().enumerate().all(|(i, p)| {
+                let (variance, sigma) = (covariance[i * n + i], p.estimate.sigma);
+                sigma > 0.0 && (variance / (sigma * sigma) - 1.0).abs() < 1e-3
+            })
+        };
+        match covariance.filter(|covariance| is_square && is_right(covariance)) {
+            Some(covariance) => Ok(KnownCamera {
+                camera,
+                parameters,
+                covariance,
+                split_half_focal_px: self.split_half_focal_px,
+                factory_focal_px: self.factory_focal_px,
+            }),
+            None => refused(format!("a covariance that is not one of its {n} parameters")),
+        }
     }
 }
 
