@@ -86,6 +86,7 @@ pub use model::Model;
 pub(crate) use model::moved;
 pub use motion::{MeanMotion, ProjectionUncertainty};
 pub(crate) use surface::alike;
+pub(crate) use views::pictures_of;
 
 use std::fmt;
 

@@ -152,16 +152,22 @@ fn measured(
 /// Views are taken by falling number of corners (then by where these lie), not by frame, so that the order of the
 /// recording does not matter; each joins the nearest leader, or leads a picture of its own.
 pub(super) fn pictures(views: &[&Measured], width_px: usize) -> Vec<usize> {
+    let corners: Vec<&[Corner]> = views.iter().map(|view| view.corners.as_slice()).collect();
+    pictures_of(&corners, width_px)
+}
+
+/// The same from the corners of each view, by ids in ascending order.
+pub(crate) fn pictures_of(views: &[&[Corner]], width_px: usize) -> Vec<usize> {
     let near_px = SAME_PICTURE_SHARE * width_px as f64;
-    let key = |view: &Measured| {
-        let x: f64 = view.corners.iter().map(|c| c.pixel.x).sum();
-        let y: f64 = view.corners.iter().map(|c| c.pixel.y).sum();
+    let key = |view: &[Corner]| {
+        let x: f64 = view.iter().map(|c| c.pixel.x).sum();
+        let y: f64 = view.iter().map(|c| c.pixel.y).sum();
         (x, y)
     };
     let mut order: Vec<usize> = (0..views.len()).collect();
     order.sort_by(|&a, &b| {
         let (ka, kb) = (key(views[a]), key(views[b]));
-        (views[b].corners.len().cmp(&views[a].corners.len()))
+        (views[b].len().cmp(&views[a].len()))
             .then(ka.0.total_cmp(&kb.0))
             .then(ka.1.total_cmp(&kb.1))
     });
@@ -195,13 +201,13 @@ struct Middle {
 }
 
 impl Middle {
-    fn of(view: &Measured) -> Self {
-        let n = view.corners.len();
-        let ids = match view.corners.as_slice() {
+    fn of(corners: &[Corner]) -> Self {
+        let n = corners.len();
+        let ids = match corners {
             [first, .., last] if last.id - first.id == n - 1 => Some((first.id, last.id)),
             _ => None,
         };
-        let mean = |of: fn(&Corner) -> f64| view.corners.iter().map(of).sum::<f64>() / n as f64;
+        let mean = |of: fn(&Corner) -> f64| corners.iter().map(of).sum::<f64>() / n as f64;
         Self { ids, pixel: [mean(|c| c.pixel.x), mean(|c| c.pixel.y)] }
     }
 
@@ -216,11 +222,11 @@ impl Middle {
 
 /// The mean distance of common corners, by ids in ascending order; `None` where there are fewer than four, and where it
 /// is `near_px` or more.
-fn distance_px(a: &Measured, b: &Measured, near_px: f64) -> Option<f64> {
+fn distance_px(a: &[Corner], b: &[Corner], near_px: f64) -> Option<f64> {
     let (mut i, mut j) = (0, 0);
     let (mut sum, mut n) = (0.0, 0_u32);
-    let far = near_px * a.corners.len().min(b.corners.len()) as f64;
-    while let (Some(p), Some(q)) = (a.corners.get(i), b.corners.get(j)) {
+    let far = near_px * a.len().min(b.len()) as f64;
+    while let (Some(p), Some(q)) = (a.get(i), b.get(j)) {
         match p.id.cmp(&q.id) {
             std::cmp::Ordering::Less => i += 1,
             std::cmp::Ordering::Greater => j += 1,

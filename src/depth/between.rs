@@ -32,6 +32,8 @@ const LEAST_SHARE: f64 = 1e-4;
 pub(super) struct Plane {
     /// Index of the frame in the recording.
     pub(super) frame: usize,
+    /// The number of the picture that it is one of.
+    pub(super) picture: usize,
     /// By which plane the sensor differs from the model.
     pub(super) beta: Vector3<f64>,
     /// By the unknowns.
@@ -51,8 +53,8 @@ pub(super) struct Plane {
 pub(super) struct Step<const M: usize> {
     pub(super) delta: SVector<f64, M>,
     pub(super) covariance: SMatrix<f64, M, M>,
-    /// By how much each frame (index in the recording) moves them.
-    pub(super) by_frame: Vec<(usize, SVector<f64, M>)>,
+    /// By how much each picture (its number) moves them.
+    pub(super) by_picture: Vec<(usize, SVector<f64, M>)>,
     /// What one σ of each of the camera's numbers does to them.
     pub(super) by_camera: Vec<SVector<f64, M>>,
 }
@@ -106,19 +108,22 @@ pub(super) fn between_frames<const M: usize>(
     let whole: f64 = likely.iter().map(|(share, _)| share).sum();
     let likely = likely.into_iter().map(|(share, weighed)| (share / whole, weighed));
 
+    let n_pictures = planes.iter().map(|plane| plane.picture + 1).max().unwrap_or(0);
     let n_camera = planes.first().map_or(0, |p| p.by_camera.len());
     let mut step = Step {
         delta: likely.clone().map(|(share, weighed)| weighed.delta * share).sum(),
         covariance: SMatrix::zeros(),
-        by_frame: planes.iter().map(|plane| (plane.frame, SVector::zeros())).collect(),
+        by_picture: (0..n_pictures).map(|picture| (picture, SVector::zeros())).collect(),
         by_camera: vec![SVector::zeros(); n_camera],
     };
     for (share, weighed) in likely {
         let (delta, information) = (weighed.delta, weighed.information);
         let inverse = Cholesky::new(information)?.inverse();
         let all = Reduced { information: information.as_slice().to_vec(), score: vec![0.0; M] };
-        let parts = weighed.parts();
-        // Without it where a frame alone determines a number.
+        // What is wrong in one frame of a picture is wrong in the others the same way.
+        let mut parts = vec![Reduced::zero(M); n_pictures];
+        weighed.parts().zip(planes).for_each(|(part, plane)| parts[plane.picture].add(&part));
+        // Without it where a picture alone determines a number.
         let clustered = Pooled::new(&all, &parts)?.clustered(M).unwrap_or_default();
         let covariance =
             SMatrix::<f64, M, M>::from_column_slice(&larger(inverse.as_slice(), &clustered));
@@ -131,7 +136,7 @@ pub(super) fn between_frames<const M: usize>(
             }
             *sum -= inverse * score * share;
         }
-        for ((_, sum), part) in step.by_frame.iter_mut().zip(parts) {
+        for ((_, sum), part) in step.by_picture.iter_mut().zip(&parts) {
             *sum += inverse * SVector::<f64, M>::from_column_slice(&part.score) * share;
         }
     }
@@ -148,12 +153,11 @@ struct Weighed<const M: usize> {
 
 impl<const M: usize> Weighed<M> {
     /// What each frame alone says: its information, and what it still asks for.
-    fn parts(&self) -> Vec<Reduced> {
-        let part = |(said, w): &(Said<M>, f64)| Reduced {
+    fn parts(&self) -> impl Iterator<Item = Reduced> {
+        self.said.iter().map(|(said, w)| Reduced {
             information: (said.information * *w).as_slice().to_vec(),
             score: ((said.score - said.information * self.delta) * *w).as_slice().to_vec(),
-        };
-        self.said.iter().map(part).collect()
+        })
     }
 }
 

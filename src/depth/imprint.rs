@@ -26,7 +26,7 @@ pub struct Imprint {
     pub zoom: Estimate,
     /// As in [`Registration`](super::Registration), pixels.
     pub shift_px: [Estimate; 2],
-    /// Of zoom, shift x and shift y (px): leaving out each frame in turn, and what the size of the neighbourhood
+    /// Of zoom, shift x and shift y (px): leaving out each picture in turn, and what the size of the neighbourhood
     /// changes.
     pub covariance: [[f64; 3]; 3],
     /// How much nearer white is measured than black, as the sensor blurs it, metres.
@@ -35,7 +35,7 @@ pub struct Imprint {
     pub n_frames: usize,
 }
 
-/// What the print says; frames are counted as the textures are.
+/// What the print says.
 pub(super) struct PrintSeen {
     pub(super) imprint: Imprint,
     /// Zoom and shift (px).
@@ -45,7 +45,7 @@ pub(super) struct PrintSeen {
 }
 
 /// What the choice of the neighbourhood moves zoom and shift (px) by: on the published recordings, 35 or 55 pixels
-/// instead of 45 change them by so much, in no one direction. Leaving out frames does not tell of it.
+/// instead of 45 change them by so much, in no one direction. Leaving out pictures does not tell of it.
 const NEIGHBOURHOOD_SIGMA: [f64; 3] = [0.0008, 0.12, 0.12];
 /// The same for the share of the other distortion state, of lenses that bend by some pixels.
 const NEIGHBOURHOOD_SIGMA_LENS: f64 = 0.1;
@@ -65,8 +65,8 @@ const LINEAR: [f64; 3] = [0.01, 1.0, 0.3];
 const TRIED: [f64; 4] = [5e-3, 0.5, 0.5, 0.1];
 /// What the normal equations say of a step, as a share of it, at the least: 0.7 to 1 in recordings.
 const LEAST_RESPONSE: f64 = 0.2;
-/// Fewer frames tell no σ.
-const LEAST_FRAMES: usize = 5;
+/// Fewer different pictures tell no σ.
+const LEAST_PICTURES: usize = 5;
 /// A frame with fewer cells says nothing.
 const LEAST_CELLS: usize = 200;
 /// How widely the sensor itself smooths, pixels (a Gaussian's σ): of 2 to 10, this explains most of the three published
@@ -298,8 +298,9 @@ struct Best<const M: usize> {
     contrast_m: f64,
     /// Of contrast (metres), zoom, shift and, of five numbers, the share of the other state.
     covariance: SMatrix<f64, M, M>,
-    /// By how much each frame moves them.
-    by_frame: Vec<(usize, SVector<f64, M>)>,
+    /// By how much each picture moves them.
+    by_picture: Vec<(usize, SVector<f64, M>)>,
+    n_frames: usize,
 }
 
 impl<const M: usize> Best<M> {
@@ -307,14 +308,15 @@ impl<const M: usize> Best<M> {
     fn seen<const K: usize>(&self) -> Seen<K> {
         let [x, y] = self.place.shift_px;
         let place = Vector4::new(self.place.zoom, x, y, self.place.lens);
-        let rows =
-            |(frame, by): &(usize, SVector<f64, M>)| (*frame, by.fixed_rows::<K>(1).into_owned());
+        let rows = |(picture, by): &(usize, SVector<f64, M>)| {
+            (*picture, by.fixed_rows::<K>(1).into_owned())
+        };
         Seen {
             found: (
                 place.fixed_rows::<K>(0).into_owned(),
                 self.covariance.fixed_view::<K, K>(1, 1).into_owned(),
             ),
-            by_frame: self.by_frame.iter().map(rows).collect(),
+            by_picture: self.by_picture.iter().map(rows).collect(),
         }
     }
 }
@@ -323,35 +325,50 @@ impl<const M: usize> Best<M> {
 struct Looks<'a> {
     print: &'a Print,
     textures: &'a [&'a Texture],
+    /// For each texture the number of the picture that it is one of.
+    pictures: &'a [usize],
     spot: &'a (dyn Fn(usize, &Place, Pixel) -> Option<Spot> + Sync),
     lens: Option<&'a RayGrid>,
 }
 
 impl Looks<'_> {
-    /// The best place, from one that is right within half a square, and its covariance by leaving out each frame in
-    /// turn (jackknife). With M = 5 the share of the other distortion state is free.
+    /// The best place, from one that is right within half a square, and its covariance by leaving out each picture in
+    /// turn (jackknife): frames of one picture have the sensor's pattern and the board's dents at the same places, and
+    /// tell nothing of what these do. With M = 5 the share of the other distortion state is free.
     fn best<const M: usize>(&self, start: Place) -> Option<Best<M>> {
         let Converged { place, normals, step_by_off } = self.converge::<M>(start)?;
         let (information, score) = total(&normals);
         let all = solve::<M>(&information, &score)?;
-        let n = normals.len() as f64;
-        let by_frame = normals
+        let mut pictures: Vec<(usize, (Matrix5<f64>, Vector5<f64>))> = Vec::new();
+        for normal in &normals {
+            let picture = self.pictures[normal.frame];
+            match pictures.iter_mut().find(|(seen, _)| *seen == picture) {
+                Some((_, (information, score))) => {
+                    *information += normal.information;
+                    *score += normal.score;
+                }
+                None => pictures.push((picture, (normal.information, normal.score))),
+            }
+        }
+        let n = pictures.len() as f64;
+        let by_picture = pictures
             .iter()
-            .map(|normal| {
-                let others = (information - normal.information, score - normal.score);
+            .map(|(picture, own)| {
+                let others = (information - own.0, score - own.1);
                 let mut by = all - solve::<M>(&others.0, &others.1)?;
                 let step = step_by_off * place_of(&by);
                 (1..M).for_each(|k| by[k] = step[k - 1]);
-                Some((normal.frame, by * ((n - 1.0) / n).sqrt()))
+                Some((*picture, by * ((n - 1.0) / n).sqrt()))
             })
             .collect::<Option<Vec<_>>>()?;
         let mut covariance = SMatrix::<f64, M, M>::zeros();
-        by_frame.iter().for_each(|(_, by)| covariance.ger(1.0, by, by, 1.0));
+        by_picture.iter().for_each(|(_, by)| covariance.ger(1.0, by, by, 1.0));
         let sigmas = NEIGHBOURHOOD_SIGMA.into_iter().chain([NEIGHBOURHOOD_SIGMA_LENS]);
         for (k, sigma) in (1..M).zip(sigmas) {
             covariance[(k, k)] += sigma * sigma;
         }
-        Some(Best { place, contrast_m: all[0], covariance, by_frame })
+        let n_frames = normals.len();
+        Some(Best { place, contrast_m: all[0], covariance, by_picture, n_frames })
     }
 
     /// The best place, the normal equations there, and how it follows what they say that it is off.
@@ -431,28 +448,27 @@ fn longest(step: &Vector4<f64>, parts: &[f64; 3]) -> f64 {
 }
 
 /// Finds contrast and place, starting from a place that is right within half a square. `look` tells where a pixel of
-/// frame i's depth map looks at a place. `None` where the print does not stand out.
+/// frame i's depth map looks at a place. `None` where the print does not stand out, or in fewer than five pictures.
 pub(super) fn find(
     print: &Print,
     start: Place,
-    textures: &[&Texture],
+    (textures, pictures): (&[&Texture], &[usize]),
     look: impl Fn(usize, &Place, Pixel) -> Option<Spot> + Sync,
     lens: Option<&RayGrid>,
 ) -> Option<PrintSeen> {
-    let looks = Looks { print, textures, spot: &look, lens: None };
+    let looks = Looks { print, textures, pictures, spot: &look, lens: None };
     let best = looks.best::<4>(start)?;
-    let Best { place, contrast_m, covariance, by_frame } = &best;
-    let n_frames = by_frame.len();
-    if n_frames < LEAST_FRAMES {
+    let Best { place, contrast_m, covariance, ref by_picture, n_frames } = best;
+    if by_picture.len() < LEAST_PICTURES {
         return None;
     }
     let estimate =
         |k: usize, value: f64| Estimate { value, sigma: covariance[(k, k)].max(0.0).sqrt() };
-    let contrast_m = estimate(0, *contrast_m);
+    let contrast_m = estimate(0, contrast_m);
     if !(contrast_m.value.abs() > LEAST_CONTRAST * contrast_m.sigma) {
         return None;
     }
-    let with_lens = lens.and_then(|_| Some(Looks { lens, ..looks }.best::<5>(*place)?.seen::<4>()));
+    let with_lens = lens.and_then(|_| Some(Looks { lens, ..looks }.best::<5>(place)?.seen::<4>()));
     let imprint = Imprint {
         zoom: estimate(1, place.zoom),
         shift_px: [2, 3].map(|k| estimate(k, place.shift_px[k - 2])),
@@ -530,7 +546,13 @@ mod tests {
                 .collect();
             let textures: Vec<&Texture> = textures.iter().collect();
             let look = |frame: usize, place: &Place, at| Some(spot(frame, place.looked_at(at)));
-            find(&print, place(1.0, [0.0; 2]), &textures, look, None).map(|seen| seen.imprint)
+            let pictures: Vec<usize> = (0..n_frames).collect();
+            let found = |pictures: &[usize]| {
+                find(&print, place(1.0, [0.0; 2]), (&textures, pictures), look, None)
+            };
+            // One picture, however often it is seen, tells no σ.
+            assert!(found(&vec![0; n_frames]).is_none());
+            found(&pictures).map(|seen| seen.imprint)
         }
     }
 

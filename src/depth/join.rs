@@ -7,10 +7,10 @@ use crate::solve::larger;
 /// Numbers and their covariance.
 pub(super) type Found<const M: usize> = (SVector<f64, M>, SMatrix<f64, M, M>);
 
-/// Numbers with their covariance, and by how much each frame moves them.
+/// Numbers with their covariance, and by how much each picture (its number) moves them.
 pub(super) struct Seen<const K: usize> {
     pub(super) found: Found<K>,
-    pub(super) by_frame: Vec<(usize, SVector<f64, K>)>,
+    pub(super) by_picture: Vec<(usize, SVector<f64, K>)>,
 }
 
 /// Two estimates as one.
@@ -23,8 +23,8 @@ pub(super) struct Joined<const M: usize> {
 /// Joins with M numbers what somebody else says of K of them, from the `first` on, weighted by the covariances; the
 /// other numbers follow by their correlations.
 ///
-/// What a frame tells both wrongly in the same way (its pose; a hand that moves between colour and depth) is in the
-/// products of what each frame moves the one and the other by: σ is the larger of that with these and without.
+/// What a picture tells both wrongly in the same way (its pose; a hand that moves between colour and depth) is in the
+/// products of what each picture moves the one and the other by: σ is the larger of that with these and without.
 ///
 /// Where the two contradict each other, by a χ² that right σ exceed in one case of twenty, σ of the K grow by Birge's
 /// ratio; below that there is nothing to say against the σ, and growing by what is chance would make them too large on
@@ -33,7 +33,6 @@ pub(super) fn join<const M: usize, const K: usize>(
     ours: &Seen<M>,
     first: usize,
     theirs: &Seen<K>,
-    of_frame: impl Fn(usize) -> usize,
 ) -> Option<Joined<M>> {
     let ((theta, covariance), (seen, seen_covariance)) = (&ours.found, &theirs.found);
     let apart = seen - theta.fixed_rows::<K>(first);
@@ -42,9 +41,8 @@ pub(super) fn join<const M: usize, const K: usize>(
     let together = theta + gain * apart;
     let alone = covariance - gain * covariance.fixed_rows::<K>(first);
     let mut common = SMatrix::<f64, M, K>::zeros();
-    for (texture, theirs) in &theirs.by_frame {
-        let frame = of_frame(*texture);
-        if let Some((_, ours)) = ours.by_frame.iter().find(|(index, _)| *index == frame) {
+    for (picture, theirs) in &theirs.by_picture {
+        if let Some((_, ours)) = ours.by_picture.iter().find(|(index, _)| index == picture) {
             common.ger(1.0, ours, theirs, 1.0);
         }
     }
@@ -71,20 +69,19 @@ mod tests {
 
     use super::*;
 
-    /// Three numbers of which somebody else knows the last two, ten frames each.
+    /// Three numbers of which somebody else knows the last two, ten pictures each.
     fn joined(apart: f64, common: f64) -> Joined<3> {
-        let own = |frame: usize| {
-            Vector3::new(0.1, 0.1, 0.1) * if frame.is_multiple_of(2) { 1.0 } else { -1.0 }
-        };
+        let own =
+            |i: usize| Vector3::new(0.1, 0.1, 0.1) * if i.is_multiple_of(2) { 1.0 } else { -1.0 };
         let ours = Seen {
             found: (Vector3::new(1.0, 0.0, 0.0), Matrix3::identity()),
-            by_frame: (0..10).map(|frame| (3 * frame, own(frame))).collect(),
+            by_picture: (0..10).map(|i| (i, own(i))).collect(),
         };
         let theirs = Seen {
             found: (Vector2::new(apart, 0.0), Matrix2::identity()),
-            by_frame: (0..10).map(|i| (i, own(i).fixed_rows::<2>(1) * common)).collect(),
+            by_picture: (0..10).map(|i| (i, own(i).fixed_rows::<2>(1) * common)).collect(),
         };
-        join(&ours, 1, &theirs, |texture| 3 * texture).expect("positive")
+        join(&ours, 1, &theirs).expect("positive")
     }
 
     #[test]
@@ -93,7 +90,7 @@ mod tests {
         assert!((value - Vector3::new(1.0, 1.0, 0.0)).norm() < 1e-12, "{value}");
         assert!((covariance - Matrix3::from_diagonal(&Vector3::new(1.0, 0.5, 0.5))).norm() < 1e-12);
         assert!((disagreement - 1.0).abs() < 1e-12); // 2²/2 over two.
-        // What both have from the same frames is worth nothing twice; what is opposite makes nothing better.
+        // What both have from the same pictures is worth nothing twice; what is opposite makes nothing better.
         let together = joined(0.0, 10.0).estimate.1;
         assert!((together[(1, 1)] - 1.0).abs() < 1e-12, "{together}");
         assert_eq!(joined(0.0, -10.0).estimate.1, joined(0.0, 0.0).estimate.1);

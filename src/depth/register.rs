@@ -15,8 +15,9 @@ use super::{
 };
 use crate::{
     board::CharucoBoard,
-    calibrate::{BoardSurface, Estimate, Parameter, abreast, both},
+    calibrate::{BoardSurface, Estimate, Parameter, abreast, both, pictures_of},
     camera::Camera,
+    detect::Corner,
     geom::Pixel,
     pose::View,
     solve::mad_sigma,
@@ -154,7 +155,7 @@ const NOISE_GROWTH_PER_M: f64 = 2.2e-3;
 /// noise of the poses nor of the sensor: its plane is three more unknowns, known beforehand as well as the heights of
 /// the corners tell of what is beyond them.
 ///
-/// **σ** is the larger of this model's and of a sandwich estimator clustered by frame, and to it is added what the
+/// **σ** is the larger of this model's and of a sandwich estimator clustered by picture, and to it is added what the
 /// camera's own covariance does (poses and rays follow each number of the camera). Not in it: a wrong square length
 /// (the scale is wrong by as much), errors of the board's surface other than its plane, and what a wrong camera *model*
 /// does.
@@ -182,11 +183,23 @@ pub fn register(input: &RegisterInput<'_>) -> Option<Registration> {
         })
         .collect();
 
+    let corners: Vec<&[Corner]> = frames
+        .iter()
+        .filter_map(|(stance, _)| {
+            let (view, _) = views.iter().find(|(view, _)| view.frame == stance.frame)?;
+            Some(view.corners.as_slice())
+        })
+        .collect();
+    let pictures = pictures_of(&corners, camera.intrinsics.width);
+
     let prior = Prior::new(scene.relief.plane_covariance());
     let planes_at = |theta: &Numbers, with_camera: bool| -> Option<Vec<Plane>> {
         let planes =
             abreast(&frames, |(stance, patches)| scene.plane(stance, patches, theta, with_camera));
-        let planes: Vec<Plane> = planes.into_iter().flatten().collect();
+        let numbered = planes.into_iter().zip(&pictures);
+        let planes: Vec<Plane> = numbered
+            .filter_map(|(plane, picture)| Some(Plane { picture: *picture, ..plane? }))
+            .collect();
         (planes.len() >= LEAST_FRAMES).then_some(planes)
     };
     let step_at = |planes: &[Plane], theta: &Numbers| {
@@ -221,19 +234,17 @@ pub fn register(input: &RegisterInput<'_>) -> Option<Registration> {
         scene.spot(frames[frame].0, pixel)
     };
     let lens = scene.lens.as_ref();
-    let print_seen = imprint::find(&print, scene.place(&theta), &textures, look, lens);
-    // Frames as the planes count them.
-    let of_frame = |texture: usize| frames[texture].0.frame;
+    let print_seen = imprint::find(&print, scene.place(&theta), (&textures, &pictures), look, lens);
     let lens_share = scene.lens.as_ref().and_then(|_| {
         let slopes = lens_by_slopes(&planes, &theta, &scene.relief, input)?;
         let seen = print_seen.as_ref().and_then(|seen| seen.with_lens.as_ref());
-        let both = seen.and_then(|seen| join(&slopes, ZOOM, seen, of_frame));
+        let both = seen.and_then(|seen| join(&slopes, ZOOM, seen));
         let (value, covariance) = both.map_or(slopes.found, |both| both.estimate);
         Some(Estimate { value: value[N], sigma: covariance[(N, N)].max(0.0).sqrt() })
     });
-    let slopes = Seen { found: (theta, with_camera(&step, input)), by_frame: step.by_frame };
+    let slopes = Seen { found: (theta, with_camera(&step, input)), by_picture: step.by_picture };
     let (imprint, both) =
-        print_seen.map(|seen| (seen.imprint, join(&slopes, ZOOM, &seen.place, of_frame))).unzip();
+        print_seen.map(|seen| (seen.imprint, join(&slopes, ZOOM, &seen.place))).unzip();
     let witnesses =
         Witnesses { slopes, imprint, both: both.flatten(), darkness: print.darkness, lens_share };
     Some(assemble(input, &scene, &frames, (&planes, witnesses)))
@@ -474,6 +485,7 @@ impl Scene<'_> {
         let depths = sights.iter().map(|(_, s)| s.board_m);
         Some(Plane {
             frame: stance.frame,
+            picture: 0,
             beta,
             gain,
             by_lens,
@@ -531,7 +543,7 @@ fn lens_by_slopes(
     let theta = theta.push(0.0);
     let step = between_frames(planes, &gains, &theta, &Prior::new(relief.plane_covariance()))?;
     let found = (theta + step.delta, with_camera(&step, input));
-    Some(Seen { found, by_frame: step.by_frame })
+    Some(Seen { found, by_picture: step.by_picture })
 }
 
 /// What zoom and shift are judged by.
