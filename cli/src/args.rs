@@ -330,8 +330,8 @@ pub(crate) struct AuditArgs {
     /// Take the camera from this file instead of calibrating
     ///
     /// The file is what `truedepth calibrate --json` printed, or the report.json of an audit. What it knows of its own
-    /// errors counts in every verdict. It must be of the device that recorded: the factory's focal lengths are
-    /// compared.
+    /// errors counts in every verdict. It must be of the device that recorded: refused where the factory's
+    /// focal lengths differ by more than 1.5 %.
     #[arg(long, value_name = "FILE", conflicts_with = "method")]
     pub(crate) calibration: Option<PathBuf>,
 

@@ -116,7 +116,7 @@ pub(super) fn conclude(
     options: &Options,
     observer: &(dyn Fn(Progress) + Sync),
 ) -> Result<Audit, Error> {
-    let layout = most_seen_layout(&frames);
+    let layout = most_seen_layout(&frames, board.layout);
     // What is seen goes before what was said: markers of the other layout are nowhere near.
     board.layout = layout.or(board.layout);
     let size_px = frames.iter().find_map(|f| f.size_px);
@@ -229,7 +229,7 @@ pub(super) fn conclude(
     })
 }
 
-fn most_seen_layout(frames: &[FrameAudit]) -> Option<Layout> {
+fn most_seen_layout(frames: &[FrameAudit], said: Option<Layout>) -> Option<Layout> {
     let count = |layout| {
         frames
             .iter()
@@ -241,6 +241,7 @@ fn most_seen_layout(frames: &[FrameAudit]) -> Option<Layout> {
     match legacy + new {
         0 => None,
         _ if new > legacy => Some(Layout::New),
+        _ if new == legacy => said.or(Some(Layout::Legacy)),
         _ => Some(Layout::Legacy),
     }
 }
@@ -366,8 +367,12 @@ fn own_camera(
                 given.camera.check_size(size, ground.place)?;
             }
             let recorded = ground.factory.map(|factory| factory.intrinsics.focal_px());
+            // A recording that was corrected by this very calibration has its focal length.
+            let is_near = |px: f64, other_px: f64| (px / other_px - 1.0).abs() <= SAME_CAMERA;
+            let own_px = given.camera.intrinsics.focal_px();
             if let (Some(given_px), Some(recorded_px)) = (given.factory_focal_px, recorded)
-                && (given_px / recorded_px - 1.0).abs() > SAME_CAMERA
+                && !is_near(given_px, recorded_px)
+                && !is_near(own_px, recorded_px)
             {
                 let recording = ground.place.to_owned();
                 return Err(Error::OtherCamera { recording, given_px, recorded_px });

@@ -152,7 +152,7 @@ pub enum Error {
     /// A camera from outside for images of another size.
     #[error(transparent)]
     CameraSize(#[from] OtherSize),
-    /// A calibration of another camera than the one that recorded.
+    /// A calibration of another camera than the one that recorded: factory focal lengths more than 1.5 % apart.
     #[error(
         "{recording}: the calibration given is of another camera: its factory says {given_px:.1} px of focal length, \
          this recording's says {recorded_px:.1} px; calibrate the device that made this recording"

@@ -122,6 +122,12 @@ pub(super) struct Shutter {
 /// not average out, and its σ has to know.
 const STILL_TO_MOVING: [f64; 2] = [0.9, 0.8];
 
+/// How much of what motion does counts, 0 to 1, where velocities leave this share of the residuals.
+fn motion_counts(share: f64) -> f64 {
+    let [still, moving] = STILL_TO_MOVING;
+    ((still - share) / (still - moving)).clamp(0.0, 1.0)
+}
+
 /// The least-squares fit of `shape` from `start`. `None` where the start does not project, or there are fewer residuals
 /// than parameters.
 pub(super) fn fit(shape: Shape<'_>, data: &Data<'_>, start: Start<'_>) -> Option<Fit> {
@@ -205,8 +211,7 @@ fn fit_sized<const S: usize>(shape: Shape<'_>, data: &Data<'_>, start: Start<'_>
         .flatten();
     let covariance = covariance.map(|covariance| match &shutter {
         Some(shutter) if shape.center == Center::Free => {
-            let [still, moving] = STILL_TO_MOVING;
-            let counts = ((still - shutter.share) / (still - moving)).clamp(0.0, 1.0);
+            let counts = motion_counts(shutter.share);
             let mut variances: Vec<f64> = (0..3).map(|i| covariance[i * n + i]).collect();
             (1..3).for_each(|i| variances[i] += counts * shutter.shift[i].powi(2));
             larger(&covariance, &variances)
@@ -327,6 +332,14 @@ mod tests {
         camera::Distortion,
         pose::Weighting,
     };
+
+    #[test]
+    fn motion_counts_by_and_by() {
+        let expected = [(1.02, 0.0), (0.9, 0.0), (0.85, 0.5), (0.8, 1.0), (0.6, 1.0)];
+        for (share, counts) in expected {
+            assert!((motion_counts(share) - counts).abs() < 1e-12, "{share}");
+        }
+    }
 
     /// The held-out sums by one step of the normal equations, against refits without each view.
     #[test]

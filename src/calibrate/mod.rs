@@ -280,8 +280,8 @@ pub struct LeftOutPicture {
 /// The calibration does not correct for it: the velocities of single views are known too badly, and freeing them
 /// costs more than it mends. What they do to the focal length differs from view to view: it averages out, and σ
 /// clustered by picture knows of it. A turn looks like another principal point, though, and hands turn the same way
-/// again: where `residual_share` is below 0.8, what the principal point would change by is added to its σ, from 0.9 on
-/// a part of it.
+/// again: where `residual_share` is below 0.8, what the principal point would change by is added to its σ; between
+/// 0.9 and 0.8 a growing part of it.
 /// Said beside the result so that who wants better holds the device still.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RollingShutter {
@@ -360,7 +360,7 @@ pub struct KnownCamera {
     pub camera: Camera,
     /// As [`Calibration::parameters`]; none where the camera is taken as exact.
     pub parameters: Vec<Parameter>,
-    /// As [`Calibration::covariance`].
+    /// As [`Calibration::covariance`]: n·n numbers for n parameters.
     pub covariance: Vec<f64>,
     /// The focal length of both halves of its views, pixels.
     pub split_half_focal_px: Option<[f64; 2]>,

@@ -23,6 +23,9 @@ const FRAME_LOST: f64 = 10.0;
 /// So many of 15 rounds take the variance from the median of the squares, χ² over three degrees of freedom.
 const ROUNDS_BY_MEDIAN: usize = 6;
 const MEDIAN_CHI2: f64 = 2.366;
+/// Fewer different pictures do not tell that poses are better than their corners' noise says: the frames of a picture
+/// agree whatever is wrong in it.
+const PICTURES_THAT_TELL: usize = 5;
 /// How far ρ may be from its start, beforehand: one standard deviation of the common logarithm of ρ.
 const RATIO_DECADES: f64 = 1.5;
 /// What is less likely than the likeliest by this does not count.
@@ -187,6 +190,10 @@ fn weigh<const M: usize>(
         })
         .collect::<Option<_>>()?;
     let n_numbers = (3 * planes.len()) as f64;
+    let mut pictures: Vec<usize> = planes.iter().map(|plane| plane.picture).collect();
+    pictures.sort_unstable();
+    pictures.dedup();
+    let least = if pictures.len() < PICTURES_THAT_TELL { 1.0 } else { f64::MIN_POSITIVE };
     let mut robust = vec![1.0; planes.len()];
     let mut delta = SVector::<f64, M>::zeros();
     let mut variance = 1.0;
@@ -215,11 +222,12 @@ fn weigh<const M: usize>(
         let n_counted = 3.0 * robust.iter().filter(|w| **w > 0.0).count() as f64;
         // A frame that is wrong by far hides in a mean that it makes itself; in the median it cannot.
         variance = if round < ROUNDS_BY_MEDIAN {
-            (median(&squares) / MEDIAN_CHI2).max(f64::MIN_POSITIVE)
+            median(&squares) / MEDIAN_CHI2
         } else {
             squares.iter().zip(&robust).map(|(s, w)| s * w).sum::<f64>()
                 / (n_counted - n_found).max(1.0)
-        };
+        }
+        .max(least);
         beyond = 0.0;
         for (w, s) in robust.iter_mut().zip(&squares) {
             let distance = (s / variance).sqrt();

@@ -185,6 +185,7 @@ pub(super) struct Spot {
 
 /// A frame's normal equations: contrast (metres), and contrast times what zoom, shift and the share of the other
 /// distortion state are off.
+#[derive(Clone)]
 struct Normal {
     frame: usize,
     information: Matrix5<f64>,
@@ -339,22 +340,22 @@ impl Looks<'_> {
         let Converged { place, normals, step_by_off } = self.converge::<M>(start)?;
         let (information, score) = total(&normals);
         let all = solve::<M>(&information, &score)?;
-        let mut pictures: Vec<(usize, (Matrix5<f64>, Vector5<f64>))> = Vec::new();
+        let mut pictures: Vec<(usize, Normal)> = Vec::new();
         for normal in &normals {
             let picture = self.pictures[normal.frame];
             match pictures.iter_mut().find(|(seen, _)| *seen == picture) {
-                Some((_, (information, score))) => {
-                    *information += normal.information;
-                    *score += normal.score;
+                Some((_, sum)) => {
+                    sum.information += normal.information;
+                    sum.score += normal.score;
                 }
-                None => pictures.push((picture, (normal.information, normal.score))),
+                None => pictures.push((picture, normal.clone())),
             }
         }
         let n = pictures.len() as f64;
         let by_picture = pictures
             .iter()
             .map(|(picture, own)| {
-                let others = (information - own.0, score - own.1);
+                let others = (information - own.information, score - own.score);
                 let mut by = all - solve::<M>(&others.0, &others.1)?;
                 let step = step_by_off * place_of(&by);
                 (1..M).for_each(|k| by[k] = step[k - 1]);

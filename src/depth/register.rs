@@ -103,7 +103,7 @@ pub struct RegisterInput<'a> {
     pub camera: &'a Camera,
     /// The camera's free numbers with their σ; without any it is taken as exact.
     pub parameters: &'a [Parameter],
-    /// Their covariance, row-major.
+    /// Their covariance, row-major: n·n numbers for n parameters.
     pub covariance: &'a [f64],
     /// The board's shape; without, it is taken as flat.
     pub surface: Option<&'a BoardSurface>,
@@ -136,7 +136,7 @@ const NOISE_FLOOR_M: f64 = 0.17e-3;
 const NOISE_GROWTH_PER_M: f64 = 2.2e-3;
 
 /// Finds scale, bias, zoom and shift with their covariance. `None` for fewer than three frames with depth on the
-/// board.
+/// board, and for a covariance that is not one of the parameters.
 ///
 /// **Two levels.** Within a frame, robustly, the patches say by which plane the sensor's depth differs from the
 /// board's: three numbers β (as a change of m in m·X = 1), and what each of the five unknowns would do to them, G.
@@ -161,6 +161,9 @@ const NOISE_GROWTH_PER_M: f64 = 2.2e-3;
 /// does.
 pub fn register(input: &RegisterInput<'_>) -> Option<Registration> {
     let RegisterInput { board, camera, parameters, surface, views, other_state, .. } = *input;
+    if input.covariance.len() != parameters.len().pow(2) {
+        return None;
+    }
     let moved = moved_cameras(camera, parameters);
     let only_views: Vec<&View> = views.iter().map(|(view, _)| *view).collect();
     let stances = stances(board, surface, camera, &moved, &only_views);

@@ -60,7 +60,8 @@ pub(super) fn measure(case: &Case<'_>, state: DistortionState) -> Option<Measure
         let focal = |given: &KnownCamera| {
             given.parameters.iter().find(|p| p.name == "focal_px").map(|p| p.estimate.sigma)
         };
-        let formal = case.given.and_then(focal);
+        // The fit's own number is the horizontal focal length.
+        let formal = case.given.and_then(focal).map(|sigma| sigma * own_px / camera.intrinsics.fx);
         let split_half = case.given.and_then(|given| given.split_half_focal_px).map(half_of);
         // Nothing known of its errors: taken as exact.
         let sigma = formal.map_or(0.0, |formal| formal.max(split_half.unwrap_or(0.0)));

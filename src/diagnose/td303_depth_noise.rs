@@ -57,8 +57,8 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
     let gaps = share.map_or_else(
         || {
             format!(
-                "only {:.0} % of the board's pixels were farther than 0.2 m and nearer than 60 degrees, too few to \
-                 judge its holes",
+                "only {:.1} % of the board's pixels were at 0.2 m or more and seen under 60 degrees at most; holes are \
+                 judged from 20 % on",
                 100.0 * in_reach
             )
         },

@@ -53,7 +53,7 @@ pub(super) fn without_a_row(audit: &Audit) -> [Vec<&Finding>; 2] {
 pub(super) fn rows(audit: &Audit) -> Vec<Row> {
     let findings = audit.findings.iter().filter(|finding| has_a_row(finding));
     let mut rows: Vec<Row> = findings.map(|finding| row(audit, finding)).collect();
-    let error = |depth: Option<&crate::depth::BoardDepth>| {
+    let error = |depth: Option<&BoardDepth>| {
         let estimate = depth.and_then(|depth| depth.mean_of_medians_m);
         estimate.map_or("—".to_owned(), |e| format!("{} mm", signed_with_sigma(in_mm(e), 2)))
     };
@@ -73,7 +73,7 @@ pub(super) fn rows(audit: &Audit) -> Vec<Row> {
     rows
 }
 
-/// In how many frames the depth error was compared, where some had nothing but errors beyond
+/// In how many frames the depth error was compared, where some had no corner with depth, or nothing but errors beyond
 /// [`MAX_ERROR_M`](crate::depth::MAX_ERROR_M).
 fn frames_that_count(audit: &Audit) -> String {
     let of = |depth: &BoardDepth| {

@@ -130,12 +130,12 @@ fn one(
     terminal.detail(&format!("{}: {} frames", recording.place(), recording.frames.len()));
     let thumbnails = folder.as_ref().map(|_| Thumbnails::new(&recording));
     let audit = watched(&recording, options, thumbnails.as_ref(), terminal)?;
-    if let (Some(said), Some(seen)) =
-        (options.board.as_ref().and_then(|board| board.layout), audit.layout)
+    let board = options.board.as_ref().or(recording.board.as_ref());
+    if let (Some(said), Some(seen)) = (board.and_then(|board| board.layout), audit.layout)
         && said != seen
     {
         terminal.warn(&format!(
-            "{}: the board given has the layout `{}`, the one in the images is `{}`: taken as seen",
+            "{}: the board is said to have the layout `{}`, the one in the images is `{}`: taken as seen",
             audit.name,
             said.name(),
             seen.name()

@@ -417,13 +417,13 @@ fn stability_rows(calibration: &wire::Calibration) -> Vec<Row> {
         let percent = 100.0 * share;
         let words = if *share < 0.8 {
             format!(
-                "views moved while read: with velocities residuals fall to {percent:.0} %, and the focal length would \
-                 be {shift:+.2} px off; hold the device still"
+                "views moved while read: with velocities residuals fall to {percent:.0} %, and the focal length comes \
+                 out {shift:+.2} px away, less surely; hold the device still"
             )
-        } else if *share < 0.95 {
+        } else if *share < 0.9 {
             format!(
                 "views moved a little while read: with velocities residuals fall to {percent:.0} %, and the focal \
-                 length would be {shift:+.2} px off"
+                 length comes out {shift:+.2} px away, less surely"
             )
         } else {
             format!("none: velocities while read leave residuals at {percent:.0} %")

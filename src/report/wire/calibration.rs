@@ -427,40 +427,59 @@ impl Calibration {
 impl Calibration {
     /// The camera with what this calibration knows of its errors.
     ///
-    /// Refused: as [`camera`](Self::camera), and a covariance that is not one of the parameters.
+    /// Refused: as [`camera`](Self::camera), numbers that no model has or without a σ, and a covariance that is not one
+    /// of these numbers.
     pub fn known(&self) -> Result<KnownCamera, Error> {
         let camera = self.camera()?;
         let refused = |what: String| Err(Error::Camera(what));
         let mut parameters = Vec::new();
         for parameter in &self.parameters {
-            let (Some(name), Some(sigma)) =
-                (calibrate::Parameter::known_name(&parameter.name), parameter.sigma)
-            else {
-                return refused(format!("a number {} without a σ, or unknown", parameter.name));
+            let name = &parameter.name;
+            let Some(known) = calibrate::Parameter::known_name(name) else {
+                return refused(format!("a number {name}, which no camera model has"));
+            };
+            let Some(sigma) = parameter.sigma.filter(|sigma| *sigma > 0.0) else {
+                return refused(format!(
+                    "{name} without a σ above 0: its views did not determine it"
+                ));
             };
             let estimate = Estimate { value: parameter.value, sigma };
-            parameters.push(calibrate::Parameter { name, estimate });
+            parameters.push(calibrate::Parameter { name: known, estimate });
         }
-        let n = parameters.len();
-        let covariance: Option<Vec<f64>> = self.covariance.iter().flatten().copied().collect();
-        let is_square =
-            self.covariance.len() == n && self.covariance.iter().all(|row| row.len() == n);
-        let is_right = |covariance: &[f64]| {
-            parameters.iter().enumerate().all(|(i, p)| {
-                let (variance, sigma) = (covariance[i * n + i], p.estimate.sigma);
-                sigma > 0.0 && (variance / (sigma * sigma) - 1.0).abs() < 1e-3
-            })
+        let Some(covariance) = self.covariance_of(&parameters) else {
+            let n = parameters.len();
+            return refused(format!("a covariance that is not one of its {n} parameters"));
         };
-        match covariance.filter(|covariance| is_square && is_right(covariance)) {
-            Some(covariance) => Ok(KnownCamera {
-                camera,
-                parameters,
-                covariance,
-                split_half_focal_px: self.split_half_focal_px,
-                factory_focal_px: self.factory_focal_px,
-            }),
-            None => refused(format!("a covariance that is not one of its {n} parameters")),
+        Ok(KnownCamera {
+            camera,
+            parameters,
+            covariance,
+            split_half_focal_px: self.split_half_focal_px,
+            factory_focal_px: self.factory_focal_px,
+        })
+    }
+
+    /// Row-major; `None` where it is no covariance, or another one.
+    fn covariance_of(&self, parameters: &[calibrate::Parameter]) -> Option<Vec<f64>> {
+        /// Numbers are written with nine digits.
+        const ROUNDING: f64 = 1e-6;
+        let n = parameters.len();
+        if self.covariance.len() != n || self.covariance.iter().any(|row| row.len() != n) {
+            return None;
         }
+        let covariance: Vec<f64> =
+            self.covariance.iter().flatten().copied().collect::<Option<_>>()?;
+        let sigma = |i: usize| parameters[i].estimate.sigma;
+        let correlation: Vec<f64> =
+            (0..n * n).map(|at| covariance[at] / (sigma(at / n) * sigma(at % n))).collect();
+        let is_one = (0..n).all(|i| {
+            (correlation[i * n + i] - 1.0).abs() < ROUNDING
+                && (0..i).all(|j| {
+                    (correlation[i * n + j] - correlation[j * n + i]).abs() < ROUNDING
+                        && correlation[i * n + j].abs() < 1.0 + ROUNDING
+                })
+        });
+        is_one.then_some(covariance)
     }
 }
 

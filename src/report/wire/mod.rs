@@ -147,6 +147,37 @@ mod tests {
     }
 
     #[test]
+    fn a_known_camera_brings_its_covariance() {
+        let audit = sample::audit();
+        let mut calibration = audit.calibration.unwrap();
+        let sigmas: Vec<f64> = calibration.parameters.iter().map(|p| p.estimate.sigma).collect();
+        let n = sigmas.len();
+        calibration.covariance = (0..n * n)
+            .map(|at| sigmas[at / n] * sigmas[at % n] * if at % (n + 1) == 0 { 1.0 } else { 0.3 })
+            .collect();
+        let right = Calibration::new(&audit.name, "auto", audit.factory.as_ref(), &calibration);
+        let known = right.known().expect("a calibration");
+        assert_eq!(known.camera, calibration.camera);
+        assert_eq!(known.parameters, calibration.parameters);
+        assert_eq!(known.covariance, calibration.covariance);
+        type Spoil = fn(&mut Calibration);
+        let wrong: [(Spoil, &str); 6] = [
+            (|c| c.parameters[0].name = "warp".to_owned(), "warp, which no camera model has"),
+            (|c| c.parameters[0].sigma = None, "without a σ"),
+            (|c| c.parameters[0].sigma = Some(0.0), "without a σ"),
+            (|c| c.parameters[0].sigma = Some(7.0), "a covariance that is not"),
+            (|c| c.covariance[0].push(Some(0.0)), "a covariance that is not"),
+            (|c| c.covariance[0][0] = None, "a covariance that is not"),
+        ];
+        for (spoil, words) in wrong {
+            let mut spoilt = right.clone();
+            spoil(&mut spoilt);
+            let error = spoilt.known().expect_err(words).to_string();
+            assert!(error.contains(words), "{error}");
+        }
+    }
+
+    #[test]
     fn audit() {
         golden("audit.json", &Document::Audit(Box::new(Audit::from(&sample::audit()))));
     }
