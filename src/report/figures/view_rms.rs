@@ -61,8 +61,8 @@ pub(in crate::report) fn rms_by_view(audit: &Audit) -> Option<Figure> {
         title: "How well each view fits".to_owned(),
         caption: "Distance between the corners as seen and as the camera model predicts them. One tall bar is a \
                   blurred or wrong view; tall bars throughout are a wrong model or a board that is not flat. With the \
-                  factory's intrinsics the board is taken for flat; with the own ones it has the shape that was found, in the frames that the \
-                  calibration used."
+                  factory's intrinsics the board is taken for flat; with the own ones it has the shape that was \
+                  found, in the frames that the calibration used."
             .to_owned(),
         legend: vec![
             Key { class: "series-own square", words: "own intrinsics" },

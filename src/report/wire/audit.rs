@@ -335,8 +335,8 @@ pub struct Frame {
     pub n_rejected: usize,
     /// Of the pose with the factory's intrinsics, the board taken for flat.
     pub factory_rms_px: Option<f64>,
-    /// Of the pose with the own camera: against the board's shape in frames that a calibration used which found one, else
-    /// against a flat board.
+    /// Of the pose with the own camera: against the board's shape in frames that a calibration used which found one,
+    /// else against a flat board.
     pub own_rms_px: Option<f64>,
     /// Fraction of the depth map without measurement.
     pub holes: Option<f64>,
