@@ -13,7 +13,7 @@ use crate::{
         temporal_noise,
     },
     detect::{Corner, Observation},
-    diagnose::{Case, Device, diagnose},
+    diagnose::{Case, Device, SAME_CAMERA, diagnose},
     geom::Pixel,
     image::DepthMap,
     pose::{View, Weighting},
@@ -26,9 +26,6 @@ const LEAST_CORNERS: usize = 9;
 /// What no corner is better than, pixels: the boards of the published recordings are uneven by 0.8 mm, which is a tenth
 /// of a pixel and more at their distance.
 const CORNER_FLOOR_PX: f64 = 0.1;
-
-/// Focal lengths that factories tell of one model of camera differ by less.
-const SAME_CAMERA: f64 = 0.015;
 
 /// What is known of a recording beside its images.
 pub(super) struct Ground<'a> {

@@ -1,7 +1,7 @@
 //! One fit: a shape to views, and what follows from the normal equations at its minimum.
 
 use super::{
-    Estimate,
+    Estimate, RollingShutter,
     model::{Center, Shape},
     motion::{Joint, MeanMotion},
     problem::{MOTION_SIGMA, Measured, Reprojection},
@@ -116,15 +116,11 @@ pub(super) struct Shutter {
     pub(super) shift: Vec<f64>,
 }
 
-/// Where velocities leave less than the second share of the residuals' standard deviation, views did move; above the
-/// first they did not: without a rolling shutter it stays near one, since the degrees of freedom are counted. A turn
-/// while rows are read looks like another principal point; hands turn the same way again and again, so that this does
-/// not average out, and its σ has to know.
-const STILL_TO_MOVING: [f64; 2] = [0.9, 0.8];
-
-/// How much of what motion does counts, 0 to 1, where velocities leave this share of the residuals.
+/// How much of what motion does counts, 0 to 1, where velocities leave this share of the residuals. A turn while rows
+/// are read looks like another principal point; hands turn the same way again and again, so that this does not average
+/// out, and its σ has to know.
 fn motion_counts(share: f64) -> f64 {
-    let [still, moving] = STILL_TO_MOVING;
+    let [still, moving] = RollingShutter::STILL_TO_MOVING;
     ((still - share) / (still - moving)).clamp(0.0, 1.0)
 }
 

@@ -297,6 +297,11 @@ pub struct RollingShutter {
     pub center_shift_px: Option<[f64; 2]>,
 }
 
+impl RollingShutter {
+    /// Where `residual_share` is above the first views did not move, where it is below the second they did.
+    pub const STILL_TO_MOVING: [f64; 2] = [0.9, 0.8];
+}
+
 /// How a board deviates from a flat one, estimated with the camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoardSurface {

@@ -94,10 +94,15 @@ pub(super) fn between_frames<const M: usize>(
     theta: &SVector<f64, M>,
     prior: &Prior<M>,
 ) -> Option<Step<M>> {
+    let mut pictures: Vec<usize> = planes.iter().map(|plane| plane.picture).collect();
+    pictures.sort_unstable();
+    pictures.dedup();
+    // Of the variance.
+    let least = if pictures.len() < PICTURES_THAT_TELL { 1.0 } else { f64::MIN_POSITIVE };
     let tried: Vec<(f64, Weighed<M>)> = (-16..=16)
         .filter_map(|i| {
             let decades = f64::from(i) / 4.0;
-            let weighed = weigh(planes, gains, (theta, prior), 10f64.powf(decades))?;
+            let weighed = weigh(planes, gains, (theta, prior), (10f64.powf(decades), least))?;
             let unlikely = 0.5 * (decades / RATIO_DECADES).powi(2);
             Some((weighed.likelihood - unlikely, weighed))
         })
@@ -111,7 +116,7 @@ pub(super) fn between_frames<const M: usize>(
     let whole: f64 = likely.iter().map(|(share, _)| share).sum();
     let likely = likely.into_iter().map(|(share, weighed)| (share / whole, weighed));
 
-    let n_pictures = planes.iter().map(|plane| plane.picture + 1).max().unwrap_or(0);
+    let n_pictures = pictures.last().map_or(0, |last| last + 1);
     let n_camera = planes.first().map_or(0, |p| p.by_camera.len());
     let mut step = Step {
         delta: likely.clone().map(|(share, weighed)| weighed.delta * share).sum(),
@@ -175,7 +180,7 @@ fn weigh<const M: usize>(
     planes: &[Plane],
     gains: &Gains<M>,
     (theta, prior): (&SVector<f64, M>, &Prior<M>),
-    ratio: f64,
+    (ratio, least): (f64, f64),
 ) -> Option<Weighed<M>> {
     let mut determinants = 0.0;
     let said: Vec<Said<M>> = planes
@@ -190,10 +195,6 @@ fn weigh<const M: usize>(
         })
         .collect::<Option<_>>()?;
     let n_numbers = (3 * planes.len()) as f64;
-    let mut pictures: Vec<usize> = planes.iter().map(|plane| plane.picture).collect();
-    pictures.sort_unstable();
-    pictures.dedup();
-    let least = if pictures.len() < PICTURES_THAT_TELL { 1.0 } else { f64::MIN_POSITIVE };
     let mut robust = vec![1.0; planes.len()];
     let mut delta = SVector::<f64, M>::zeros();
     let mut variance = 1.0;

@@ -178,21 +178,14 @@ pub fn register(input: &RegisterInput<'_>) -> Option<Registration> {
             RayGrid::of([k.width, k.height], |p| other(p).map(|at| [at.x - p.x, at.y - p.y]))
         }),
     };
-    let frames: Vec<(&Stance, &Patches)> = stances
+    type Frames<'f> = Vec<(&'f Stance, &'f Patches)>;
+    let (frames, corners): (Frames<'_>, Vec<&[Corner]>) = stances
         .iter()
         .filter_map(|stance| {
-            let (_, patches) = views.iter().find(|(view, _)| view.frame == stance.frame)?;
-            Some((stance, *patches))
+            let (view, patches) = views.iter().find(|(view, _)| view.frame == stance.frame)?;
+            Some(((stance, *patches), view.corners.as_slice()))
         })
-        .collect();
-
-    let corners: Vec<&[Corner]> = frames
-        .iter()
-        .filter_map(|(stance, _)| {
-            let (view, _) = views.iter().find(|(view, _)| view.frame == stance.frame)?;
-            Some(view.corners.as_slice())
-        })
-        .collect();
+        .unzip();
     let pictures = pictures_of(&corners, camera.intrinsics.width);
 
     let prior = Prior::new(scene.relief.plane_covariance());

@@ -67,7 +67,7 @@ const CAMERAS: [(&str, &str); 5] = [
 
 /// Units of one camera scatter by 0.6 % in the paper's tables; the iPhone 13's focal length, of which there is no row,
 /// lies 0.7 % below the 11 Pro's.
-const SAME_CAMERA: f64 = 0.015;
+pub(crate) const SAME_CAMERA: f64 = 0.015;
 
 /// Whose front camera has these numbers; `None` for any other camera.
 fn model(factory: &Factory) -> Option<&'static str> {

@@ -58,6 +58,7 @@ mod tests;
 
 pub use case::{Case, diagnose};
 pub use code::{Code, UnknownCode};
+pub(crate) use device::SAME_CAMERA;
 pub use device::{Device, DistortionState, Sensor};
 pub use finding::{Correction, Evidence, Finding, Tolerances, Unit, Verdict};
 pub use inspect::{Inspection, inspect};

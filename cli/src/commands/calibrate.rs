@@ -6,8 +6,8 @@ use rayon::prelude::*;
 use truedepth::{
     board::CharucoBoard,
     calibrate::{
-        self, FrameCorners, Input as Views, Method, Model, calibrate_from, coverage,
-        guess_intrinsics,
+        self, FrameCorners, Input as Views, Method, Model, RollingShutter, calibrate_from,
+        coverage, guess_intrinsics,
     },
     detect::{Corner, Detector},
     export::{self, Format},
@@ -415,12 +415,13 @@ fn stability_rows(calibration: &wire::Calibration) -> Vec<Row> {
     }) = &calibration.rolling_shutter
     {
         let percent = 100.0 * share;
-        let words = if *share < 0.8 {
+        let [still, moving] = RollingShutter::STILL_TO_MOVING;
+        let words = if *share < moving {
             format!(
                 "views moved while read: with velocities residuals fall to {percent:.0} %, and the focal length comes \
                  out {shift:+.2} px away, less surely; hold the device still"
             )
-        } else if *share < 0.9 {
+        } else if *share < still {
             format!(
                 "views moved a little while read: with velocities residuals fall to {percent:.0} %, and the focal \
                  length comes out {shift:+.2} px away, less surely"
