@@ -8,22 +8,20 @@
 use std::{error::Error, time::Instant};
 
 use truedepth::{
-    correct::{Corrector, Plan, Sampling},
-    recording::{Limits, Recording, encode_depth},
-    simulate::Fault,
+    correct::{Corrector, Plan},
+    recording::{Defect, Limits, Recording, encode_depth},
 };
 
 #[allow(clippy::print_stdout, reason = "the result of a program")]
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let path = arguments.next().ok_or("name a recording")?;
-    let mut faults: Vec<Fault> = arguments.map(|text| text.parse()).collect::<Result<_, _>>()?;
-    if faults.is_empty() {
-        faults = vec![Fault::Distorted, Fault::DepthZoom { zoom: 0.9507 }];
+    let mut defects: Vec<Defect> = arguments.map(|text| text.parse()).collect::<Result<_, _>>()?;
+    if defects.is_empty() {
+        defects = vec![Defect::Distorted, Defect::DepthZoom { zoom: [0.9507; 2] }];
     }
     let recording = Recording::open(&path, &Limits::default())?;
-    let said = recording.factory().ok_or("no metadata")?.intrinsics;
-    let plan = Plan::from_faults(faults, &said, Sampling::EdgeAware)?;
+    let plan = Plan::given(&defects)?;
     let corrector = Corrector::new(&recording, &plan)?;
     let [mut decode_s, mut resample_s, mut encode_s] = [0.0; 3];
     let mut n_bytes = 0;

@@ -20,8 +20,8 @@ use truedepth::{
     audit::{Audit, Method, Options, Seen, audit, audit_seen},
     calibrate::{Estimate, Lens},
     diagnose::{Code, Finding, Verdict},
-    recording::{Limits, Memory, Recording},
-    simulate::{Device, Faults, Plan, Stream},
+    recording::{Limits, Memory, Recording, StreamState},
+    simulate::{Device, Faults, Plan},
 };
 
 /// Recordings of all devices in turn, with 15 to 30 frames, half of the boards wavy.
@@ -74,7 +74,7 @@ fn errors(plan: &Plan, audit: &Audit) -> Vec<(&'static str, f64, f64)> {
     }
     // The principal point is not free in the model that is mostly chosen, but it is in the test of the distortion.
     let lens = match (plan.stream(), factory_has_tables(plan)) {
-        (Stream::Rectified, _) => Lens::None,
+        (StreamState::Rectified, _) => Lens::None,
         (_, true) => Lens::InverseTable,
         (_, false) => Lens::FreeRadial,
     };
@@ -84,17 +84,17 @@ fn errors(plan: &Plan, audit: &Audit) -> Vec<(&'static str, f64, f64)> {
         add("centre y, px", h.center_px[1], camera.cy);
     }
     if let Some(found) = &audit.registration {
-        add("depth scale", found.scale, 1.0 + truth.depth.scale_excess);
+        add("depth scale", found.scale, truth.depth.scale);
         add("depth bias, m", found.bias_m, truth.depth.bias_m);
-        add("zoom", found.zoom, truth.depth.zoom);
+        add("zoom", found.zoom, truth.depth.zoom[0]);
         add("shift x, px", found.shift_px[0], truth.depth.shift_px[0]);
         add("shift y, px", found.shift_px[1], truth.depth.shift_px[1]);
         // Each witness for itself.
-        add("zoom, slopes", found.slopes.zoom, truth.depth.zoom);
+        add("zoom, slopes", found.slopes.zoom, truth.depth.zoom[0]);
         add("shift x, slopes", found.slopes.shift_px[0], truth.depth.shift_px[0]);
         add("shift y, slopes", found.slopes.shift_px[1], truth.depth.shift_px[1]);
         if let Some(print) = &found.imprint {
-            add("zoom, print", print.zoom, truth.depth.zoom);
+            add("zoom, print", print.zoom, truth.depth.zoom[0]);
             add("shift x, print", print.shift_px[0], truth.depth.shift_px[0]);
             add("shift y, print", print.shift_px[1], truth.depth.shift_px[1]);
         }
@@ -136,9 +136,9 @@ fn table(title: &str, plans: &[Plan], audits: &[Audit]) {
     }
     // Streams that are as the lens drew them are no slip of the check.
     let is_true = |plan: &Plan, code: Code| {
-        let made = |name: &str| plan.faults.iter().any(|f| f.to_string().starts_with(name));
+        let made = |name: &str| plan.faults.defects().iter().any(|d| d.name().starts_with(name));
         match code {
-            Code::TD203 => plan.stream() == Stream::Distorted,
+            Code::TD203 => plan.stream() == StreamState::Distorted,
             Code::TD301 => made("depth-scale"),
             Code::TD302 => made("depth-bias"),
             Code::TD401 => made("depth-zoom"),

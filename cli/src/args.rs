@@ -15,7 +15,8 @@ pub(crate) use pictures::{DepthRange, OverlayArgs, UndistortArgs};
 use truedepth::{
     board::{self, CharucoBoard, Dictionary},
     calibrate::Model,
-    simulate::{Device, Fault, FaultError},
+    recording::DefectError,
+    simulate::{Device, Faults},
 };
 
 /// Is the depth of an Apple TrueDepth recording true? And if not: what is wrong, by how much, how sure, what fixes it?
@@ -657,7 +658,7 @@ pub(crate) struct SimulateArgs {
 
     /// What is wrong with it; may be given several times
     #[arg(long = "fault", value_name = "FAULT", value_parser = fault)]
-    pub(crate) faults: Vec<Option<Fault>>,
+    pub(crate) faults: Vec<String>,
 
     /// How the camera is led: round the board for calibration, or straight at it for depth
     #[arg(long, default_value = "hand-held")]
@@ -684,9 +685,9 @@ pub(crate) enum Trajectory {
     FrontoParallel,
 }
 
-/// `none` is no fault.
-fn fault(text: &str) -> Result<Option<Fault>, FaultError> {
-    if text == "none" { Ok(None) } else { text.parse().map(Some) }
+/// A fault that can be: all are read together.
+fn fault(text: &str) -> Result<String, DefectError> {
+    Faults::parse([text]).map(|_| text.to_owned())
 }
 
 fn simulate_help() -> String {
@@ -700,7 +701,7 @@ Examples:
 Faults:
 ",
     );
-    for (form, words) in Fault::known() {
+    for (form, words) in Faults::known() {
         text.push_str(&format!("  {form:<22} {words}\n"));
     }
     text

@@ -13,7 +13,7 @@ use crate::{
         temporal_noise,
     },
     detect::{Corner, Observation},
-    diagnose::{Case, Device, SAME_CAMERA, diagnose},
+    diagnose::{Case, Device, SAME_CAMERA, depth_state, diagnose},
     geom::Pixel,
     image::DepthMap,
     pose::{View, Weighting},
@@ -200,7 +200,7 @@ pub(super) fn conclude(
         handedness,
         tolerances: options.tolerances,
     });
-    let depth_distortion_state = distortion_state.of_depth(lens_share);
+    let depth_distortion_state = depth_state(distortion_state, lens_share);
     observer(Progress { stage: Stage::Judge, done: 1, total: 1 });
     Ok(Audit {
         name: ground.name.to_owned(),

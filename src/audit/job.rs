@@ -12,10 +12,10 @@ use crate::{
     camera::{Camera, OtherSize},
     depth::{BoardDepth, Handedness, Patches, Registration, TemporalNoise},
     detect::{Detector, Observation},
-    diagnose::{Device, DistortionState, Finding, Verdict},
+    diagnose::{Device, Finding, Verdict},
     image::Rgb,
     pose::View,
-    recording::{self, Factory, Problem, Recording},
+    recording::{self, Factory, Problem, Recording, StreamState},
 };
 
 /// Everything that can be known of a recording.
@@ -58,9 +58,9 @@ pub struct Audit {
     /// How much of the lens' distortion is left in the stream, from the pixels; `None` where the views do not tell.
     pub distortion: Option<DistortionTest>,
     /// Whether the stream still carries the lens' distortion.
-    pub distortion_state: DistortionState,
+    pub distortion_state: StreamState,
     /// The same of the depth maps, which may be resampled without the colour images.
-    pub depth_distortion_state: DistortionState,
+    pub depth_distortion_state: StreamState,
     /// What follows, by code.
     pub findings: Vec<Finding>,
 }
@@ -329,7 +329,7 @@ mod tests {
         assert_eq!(audit.n_frames_with_board(), 0);
         assert!(!audit.has_faults() && audit.calibration.is_none() && audit.camera.is_none());
         assert!(audit.no_calibration.expect("a reason").contains("not seen in any frame"));
-        assert_eq!(audit.distortion_state, DistortionState::Unknown);
+        assert_eq!(audit.distortion_state, StreamState::Unknown);
         for finding in audit.findings.iter().filter(|f| f.verdict == Verdict::Unknown) {
             assert!(!finding.what_to_do.is_empty(), "{finding:?}");
         }

@@ -1,6 +1,6 @@
 //! Why a correction cannot be made.
 
-use crate::{camera::OtherSize, recording};
+use crate::{camera::OtherSize, recording, recording::DefectError};
 
 /// A correction that cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -9,19 +9,9 @@ pub enum Error {
     /// A file cannot be read or written.
     #[error(transparent)]
     Recording(#[from] recording::Error),
-    /// A parameter no camera has.
-    #[error("{step}: {value} is not possible; take {range}")]
-    Parameter {
-        /// The step, by name.
-        step: &'static str,
-        /// As given.
-        value: String,
-        /// What is possible.
-        range: &'static str,
-    },
-    /// The same step twice.
-    #[error("`{0}` is given twice; give it once")]
-    Twice(&'static str),
+    /// Defects that cannot be.
+    #[error(transparent)]
+    Defect(#[from] DefectError),
     /// The recording lacks what a step needs.
     #[error("{recording}: {step} needs {what}, which the recording does not have; {remedy}")]
     Missing {

@@ -3,7 +3,7 @@
 use sha2::{Digest, Sha256};
 
 use super::{
-    Error, Mirrored, Plan,
+    Error, Plan,
     map::{Geometry, PixelMap},
     warp::{ColorWarp, DepthWarp},
 };
@@ -75,9 +75,7 @@ pub fn correct_observed<S: Sink>(
     observer: &mut dyn FnMut(Progress),
 ) -> Result<Corrected, Error> {
     let reference = recording.factory().map(|f| f.intrinsics);
-    let amended = |factory: &Factory| {
-        reference.map(|reference| plan.intrinsics(&factory.intrinsics, &reference))
-    };
+    let amended = |factory: &Factory| plan.intrinsics(&factory.intrinsics);
     let corrector = Corrector::new(recording, plan)?;
     let total = recording.frames.len();
     // All that grows with the number of files, in one piece: images come and go, and what is kept between them would
@@ -112,9 +110,7 @@ pub fn correct_observed<S: Sink>(
         let frame = recording.frame_at(timestamp);
         let factory = frame.and_then(|f| f.factory.as_deref()).or(recording.factory());
         Amendment {
-            intrinsics: factory
-                .and_then(amended)
-                .filter(|k| factory.is_none_or(|f| f.intrinsics != *k)),
+            intrinsics: factory.map(amended).filter(|k| factory.is_none_or(|f| f.intrinsics != *k)),
             rectified: plan.lens().is_some(),
         }
     };
@@ -151,7 +147,7 @@ pub fn correct_observed<S: Sink>(
         files,
         left_out,
         before: reference,
-        after: recording.factory().and_then(amended),
+        after: recording.factory().map(amended),
         n_frames: total,
         n_depths,
         previous,
@@ -189,21 +185,22 @@ struct Warps {
 
 impl Warps {
     fn new(recording: &Recording, plan: &Plan, factory: Option<&Factory>) -> Result<Self, Error> {
-        let reference = recording.factory().map(|f| f.intrinsics);
-        let after = factory.zip(reference).map(|(f, r)| plan.intrinsics(&f.intrinsics, &r));
+        let after = factory.map(|f| plan.intrinsics(&f.intrinsics));
         let geometry = Geometry::new(plan, factory, after, recording.place())?;
         let mut warps = Self { color: None, depth: None };
-        if !plan.moves_depth() {
+        let missing = |step| Error::Missing {
+            recording: recording.place().to_owned(),
+            step,
+            what: "factory metadata",
+            remedy: "record with an app that saves them",
+        };
+        if let (Some(defect), None) = (plan.in_metadata(), after) {
+            return Err(missing(defect.step()));
+        }
+        if !plan.resamples_depth() {
             return Ok(warps);
         }
-        let Some(Intrinsics { width, height, .. }) = after else {
-            return Err(Error::Missing {
-                recording: recording.place().to_owned(),
-                step: "shift",
-                what: "factory metadata",
-                remedy: "record with an app that saves them",
-            });
-        };
+        let Some(Intrinsics { width, height, .. }) = after else { return Err(missing("shift")) };
         if plan.lens().is_some() {
             let map = PixelMap::new(width, height, |at| geometry.color_source(at));
             warps.color = Some(ColorWarp::new(&map));
@@ -255,7 +252,7 @@ impl<'a> Corrector<'a> {
     fn warps(&self, index: usize) -> Result<OwnWarps, Error> {
         Ok(OwnWarps(match self.recording.frames[index].factory.as_deref() {
             Some(factory)
-                if self.recording.factory() != Some(factory) && self.plan.moves_depth() =>
+                if self.recording.factory() != Some(factory) && self.plan.resamples_depth() =>
             {
                 Some(Warps::new(self.recording, self.plan, Some(factory))?)
             }
@@ -303,7 +300,7 @@ impl OwnWarps {
 }
 
 fn color(mut image: Rgb, plan: &Plan, warps: &Warps) -> Rgb {
-    if plan.unmirror() == Some(Mirrored::Both) {
+    if plan.mirrors_color() {
         image = image.mirrored();
     }
     match &warps.color {
@@ -313,13 +310,13 @@ fn color(mut image: Rgb, plan: &Plan, warps: &Warps) -> Rgb {
 }
 
 fn depth(mut map: DepthMap, plan: &Plan, warps: &Warps) -> DepthMap {
-    if plan.unmirror().is_some() {
+    if plan.mirrors_depth() {
         map = map.mirrored();
     }
     if let Some(warp) = &warps.depth {
         map = warp.apply(&map);
     }
-    let (scale, bias_m) = plan.line();
+    let (scale, bias_m) = plan.depth_scale_and_bias();
     if (scale, bias_m) != (1.0, 0.0) {
         let (factor, bias_m) = (1.0 / scale as f32, bias_m as f32);
         let depth_m = map.depth_m().iter().map(|z| (z - bias_m) * factor).collect();

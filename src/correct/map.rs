@@ -1,6 +1,6 @@
 //! Where each pixel of the corrected image comes from.
 
-use super::{Error, Lens, Mirrored, Plan};
+use super::{Error, Plan, plan::Lens};
 use crate::{camera::Intrinsics, geom::Pixel, recording::Factory};
 
 /// The source pixel of every pixel of an image; NaN where there is none.
@@ -79,7 +79,6 @@ impl<'a> Geometry<'a> {
         match self.plan.lens() {
             None => Some(at),
             Some(Lens::OwnTables) => self.factory?.tables.as_ref()?.distort(at),
-            Some(Lens::Tables(tables)) => tables.distort(at),
             // Rectified once more, each pixel went where the inverse table says.
             Some(Lens::OwnTablesTwice) => self.factory?.tables.as_ref()?.forward.invert(at),
             Some(Lens::Camera(camera)) => camera.project_ray(self.after?.ray_from_pixel(at)),
@@ -92,15 +91,5 @@ impl<'a> Geometry<'a> {
         let ([zx, zy], [sx, sy]) = (self.plan.zoom(), self.plan.shift_px());
         let (cx, cy) = self.after.map_or((0.0, 0.0), |k| (k.cx, k.cy));
         Some(Pixel::new(cx + (color.x - cx) / zx + sx, cy + (color.y - cy) / zy + sy))
-    }
-}
-
-impl Mirrored {
-    /// `both` or `depth`: stable, for machines.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Both => "both",
-            Self::Depth => "depth",
-        }
     }
 }

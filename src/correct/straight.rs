@@ -9,6 +9,7 @@ use crate::{
     camera::{Camera, Distortion, TablePair},
     detect::Observation,
     geom::Pixel,
+    recording::StreamState,
     solve::{mean, standard_error},
 };
 
@@ -161,31 +162,6 @@ fn fitted(points: Vec<Pixel>) -> BoardLine {
     BoardLine { on_line: points.iter().map(foot).collect(), points }
 }
 
-/// What the board's lines say about a stream.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum StreamState {
-    /// As recorded lines are straightest: it is rectified already, or its lens needs no rectification.
-    Straight,
-    /// The forward table straightens it: it carries the lens' distortion.
-    Distorted,
-    /// The inverse table straightens it: it was rectified once too often.
-    RectifiedTwice,
-    /// The differences do not stand out, or the board was seen in too few frames.
-    Unknown,
-}
-
-impl StreamState {
-    /// `straight`, `distorted`, `rectified_twice` or `unknown`: stable, for machines.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Straight => "straight",
-            Self::Distorted => "distorted",
-            Self::RectifiedTwice => "rectified_twice",
-            Self::Unknown => "unknown",
-        }
-    }
-}
-
 /// Straightness of a recording's lines under each treatment.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Straightness {
@@ -250,7 +226,7 @@ impl Straightness {
         };
         let best = (0..3).find(|&i| (0..3).all(|j| j == i || straighter(i, j)));
         match best.map(|i| Treatment::ALL[i]) {
-            Some(Treatment::Original) => StreamState::Straight,
+            Some(Treatment::Original) => StreamState::Rectified,
             Some(Treatment::Forward) => StreamState::Distorted,
             Some(Treatment::Inverse) => StreamState::RectifiedTwice,
             None => StreamState::Unknown,
@@ -304,7 +280,7 @@ mod tests {
         let camera = camera();
         let straight = measured(|p| p);
         assert_eq!((straight.n_frames(), straight.n_lines()), (6, 96));
-        assert_eq!(straight.state(), StreamState::Straight);
+        assert_eq!(straight.state(), StreamState::Rectified);
         let distorted = measured(|p| distort(&camera, p).unwrap());
         assert_eq!(distorted.state(), StreamState::Distorted);
         let [original, forward, inverse] = distorted.rms_px().unwrap();

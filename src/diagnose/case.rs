@@ -1,11 +1,11 @@
 //! What a diagnosis starts from, and the order of the checks.
 
 use super::{
-    DistortionState, Finding, Tolerances, td101_files, td102_dropped_frames,
-    td103_metadata_incomplete, td104_depth_unit, td105_depth_not_metric, td201_focal_length,
-    td202_principal_point, td203_not_rectified, td204_rectified_twice, td205_factory_changed,
-    td301_depth_scale, td302_depth_bias, td303_depth_noise, td401_zoom, td402_shift,
-    td403_mirrored, td501_distortion_centre, td502_reference_dimensions, td503_intrinsics_size,
+    Finding, Tolerances, td101_files, td102_dropped_frames, td103_metadata_incomplete,
+    td104_depth_unit, td105_depth_not_metric, td201_focal_length, td202_principal_point,
+    td203_not_rectified, td204_rectified_twice, td205_factory_changed, td301_depth_scale,
+    td302_depth_bias, td303_depth_noise, td401_zoom, td402_shift, td403_mirrored,
+    td501_distortion_centre, td502_reference_dimensions, td503_intrinsics_size,
     td504_field_of_view,
 };
 use crate::{
@@ -15,7 +15,7 @@ use crate::{
     depth::{BoardDepth, DepthSteps, Handedness, Registration, TemporalNoise},
     detect::Observation,
     pose::View,
-    recording::{Factory, Problem},
+    recording::{Factory, Problem, StreamState},
 };
 
 /// Everything known before anything is judged.
@@ -133,7 +133,7 @@ impl Case<'_> {
 }
 
 /// One finding per check, in order of their codes, and what they say about the stream's distortion.
-pub fn diagnose(case: &Case<'_>) -> (Vec<Finding>, DistortionState) {
+pub fn diagnose(case: &Case<'_>) -> (Vec<Finding>, StreamState) {
     let state = td203_not_rectified::state(case);
     // A focal length is comparable with the factory's only once the distortion is out of the way.
     let focal = td201_focal_length::measure(case, state);

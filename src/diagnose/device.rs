@@ -1,7 +1,10 @@
 //! Which camera made a recording.
 
 use super::{Registry, Sheet};
-use crate::{calibrate::Estimate, recording::Factory};
+use crate::{
+    calibrate::Estimate,
+    recording::{Factory, StreamState},
+};
 
 /// The kind of depth sensor. People often do not know which one they have, so every report says it first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -84,45 +87,20 @@ fn model(factory: &Factory) -> Option<&'static str> {
         .map(|(_, name)| *name)
 }
 
-/// Whether the stream still carries the lens' distortion.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum DistortionState {
-    /// Straight lines are straight.
-    Rectified,
-    /// As the lens drew it.
-    Distorted,
-    /// Bent the other way: the table was applied to a stream that was straight already.
-    RectifiedTwice,
-    /// The recording does not tell.
-    Unknown,
-}
-
-impl DistortionState {
-    /// `rectified`, `distorted`, `rectified_twice` or `unknown`: stable, for machines.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Rectified => "rectified",
-            Self::Distorted => "distorted",
-            Self::RectifiedTwice => "rectified_twice",
-            Self::Unknown => "unknown",
-        }
-    }
-
-    /// The depth map's state where this is the colour image's, by the share of the other state that depth has
-    /// ([`Registration::lens_share`](crate::depth::Registration::lens_share)): told where the share is on one side of
-    /// one half by 2 sigma, each with 97.7 % confidence.
-    #[must_use]
-    pub fn of_depth(self, lens_share: Option<Estimate>) -> Self {
-        let Some(Estimate { value, sigma }) = lens_share else { return Self::Unknown };
-        let is_same = value.abs() + 2.0 * sigma < 0.5;
-        // As for colour, what lies beyond the whole of the table is distorted all the more.
-        let is_other = value - 2.0 * sigma > 0.5;
-        match self {
-            Self::Rectified | Self::Distorted if is_same => self,
-            Self::Rectified if is_other => Self::Distorted,
-            Self::Distorted if is_other => Self::Rectified,
-            _ => Self::Unknown,
-        }
+/// The depth map's state where `color` is the colour image's, by the share of the other state that depth has
+/// ([`Registration::lens_share`](crate::depth::Registration::lens_share)): known where the share is on one side of
+/// one half by 2 sigma, each with 97.7 % confidence.
+pub fn depth_state(color: StreamState, lens_share: Option<Estimate>) -> StreamState {
+    use StreamState::{Distorted, Rectified, Unknown};
+    let Some(Estimate { value, sigma }) = lens_share else { return Unknown };
+    let is_same = value.abs() + 2.0 * sigma < 0.5;
+    // As for colour, what lies beyond the whole of the table is distorted all the more.
+    let is_other = value - 2.0 * sigma > 0.5;
+    match color {
+        Rectified | Distorted if is_same => color,
+        Rectified if is_other => Distorted,
+        Distorted if is_other => Rectified,
+        _ => Unknown,
     }
 }
 
@@ -133,7 +111,7 @@ mod tests {
 
     #[test]
     fn depth_is_as_colour_is_or_the_other_way() {
-        use DistortionState::{Distorted, Rectified, RectifiedTwice, Unknown};
+        use StreamState::{Distorted, Rectified, RectifiedTwice, Unknown};
         for (color, value, sigma, expected) in [
             (Rectified, 0.1, 0.1, Rectified),
             (Rectified, 0.9, 0.15, Distorted),
@@ -147,9 +125,9 @@ mod tests {
             (Unknown, 0.0, 0.1, Unknown),
         ] {
             let share = Estimate { value, sigma };
-            assert_eq!(color.of_depth(Some(share)), expected, "{color:?} {share:?}");
+            assert_eq!(depth_state(color, Some(share)), expected, "{color:?} {share:?}");
         }
-        assert_eq!(Rectified.of_depth(None), Unknown);
+        assert_eq!(depth_state(Rectified, None), Unknown);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! What a finding says.
 
 use super::Code;
-use crate::{calibrate::Estimate, camera::TablePair};
+use crate::{calibrate::Estimate, recording::Defect};
 
 /// The judgement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -93,76 +93,6 @@ pub struct Evidence {
     pub sigma: Option<f64>,
 }
 
-/// What a recording would have to be put through to be true. Parameters are those of this recording.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Correction {
-    /// Replace the focal length: metadata only, safe.
-    Focal {
-        /// The true focal length at the image's size, pixels.
-        focal_px: f64,
-    },
-    /// Replace the principal point: metadata only, safe.
-    PrincipalPoint {
-        /// The true principal point at the image's size, pixels.
-        center_px: [f64; 2],
-    },
-    /// Resample colour (and depth, never blending) to straight lines with Apple's forward table: changes the data.
-    Undistort {
-        /// The tables, where the recording has them; without, the own camera model has to be used.
-        tables: Option<Box<TablePair>>,
-    },
-    /// Divide depth by a factor after taking away a bias: changes the data.
-    Depth {
-        /// Sensor = scale · truth + bias.
-        scale: f64,
-        /// Bias, metres.
-        bias_m: f64,
-    },
-    /// Resample the depth map to the colour image, never blending: its pixel q holds what belongs to the colour pixel
-    /// c + zoom·(q − shift − c), c the principal point. Changes the data.
-    Align {
-        /// Window of the colour image that the depth map shows, over the whole; 1 where only the shift is at fault.
-        zoom: f64,
-        /// How far depth lies right of and below its place, pixels; 0 where only the zoom is at fault.
-        shift_px: [f64; 2],
-    },
-    /// Mirror the images back: changes the data.
-    Unmirror,
-    /// Mirror the depth maps alone back: changes the data.
-    UnmirrorDepth,
-    /// Divide the intrinsics by reference size over image size: metadata only, safe.
-    ScaleIntrinsics {
-        /// Factor for fx and cx, and for fy and cy.
-        factor: [f64; 2],
-    },
-}
-
-impl Correction {
-    /// `focal`, `principal_point`, `undistort`, `depth`, `align`, `unmirror`, `unmirror_depth` or `scale_intrinsics`:
-    /// stable, for machines.
-    pub const fn name(&self) -> &'static str {
-        match self {
-            Self::Focal { .. } => "focal",
-            Self::PrincipalPoint { .. } => "principal_point",
-            Self::Undistort { .. } => "undistort",
-            Self::Depth { .. } => "depth",
-            Self::Align { .. } => "align",
-            Self::Unmirror => "unmirror",
-            Self::UnmirrorDepth => "unmirror_depth",
-            Self::ScaleIntrinsics { .. } => "scale_intrinsics",
-        }
-    }
-
-    /// True where images or depth maps change, false where only metadata do.
-    pub const fn changes_data(&self) -> bool {
-        !matches!(
-            self,
-            Self::Focal { .. } | Self::PrincipalPoint { .. } | Self::ScaleIntrinsics { .. }
-        )
-    }
-}
-
 /// One thing that was checked.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finding {
@@ -184,9 +114,9 @@ pub struct Finding {
     pub evidence: Vec<Evidence>,
     /// What the person should do now; with *unknown*, what to record to be able to tell. Empty where nothing is.
     pub what_to_do: String,
-    /// What would make the data true, where something would: of a fault, and of a deviation that is significant though
-    /// within the tolerance (*info*), which is corrected only where that is asked for.
-    pub correction: Option<Correction>,
+    /// What is wrong, where it could be removed: of a fault, and of a deviation that is significant though within the
+    /// tolerance (*info*), which is corrected only where that is asked for.
+    pub defect: Option<Defect>,
 }
 
 impl Evidence {
@@ -212,15 +142,15 @@ impl Finding {
             summary: String::new(),
             evidence: Vec::new(),
             what_to_do: String::new(),
-            correction: None,
+            defect: None,
         }
     }
 
-    /// Names the correction where there is something to correct for sure: a fault, or a deviation that is significant
-    /// though within the tolerance.
-    pub(super) fn correct_if_significant(&mut self, correction: Correction) {
+    /// Names the defect where there is one for sure: a fault, or a deviation that is significant though within the
+    /// tolerance.
+    pub(super) fn name_if_significant(&mut self, defect: Defect) {
         if matches!(self.verdict, Verdict::Fault | Verdict::Info) {
-            self.correction = Some(correction);
+            self.defect = Some(defect);
         }
     }
 

@@ -2,7 +2,7 @@
 //!
 //! [`diagnose`] takes a [`Case`] (what was read, seen, calibrated and compared) and gives one [`Finding`] per check.
 //! A finding has a [`Code`], a [`Verdict`] under the caller's [`Tolerances`], value and sigma with [`Unit`], the
-//! evidence in numbers and in a sentence, what to do, and the [`Correction`] it calls for.
+//! evidence in numbers and in a sentence, what to do, and the [`Defect`](crate::recording::Defect) it calls for.
 //!
 //! The rule behind every verdict, in [`Verdict::of`]: a *fault* is significant (beyond 3 σ) **and** relevant (beyond
 //! the tolerance); *ok* means that a fault of relevant size would have been seen; what is neither is *unknown*, and
@@ -59,8 +59,8 @@ mod tests;
 pub use case::{Case, diagnose};
 pub use code::{Code, UnknownCode};
 pub(crate) use device::SAME_CAMERA;
-pub use device::{Device, DistortionState, Sensor};
-pub use finding::{Correction, Evidence, Finding, Tolerances, Unit, Verdict};
+pub use device::{Device, Sensor, depth_state};
+pub use finding::{Evidence, Finding, Tolerances, Unit, Verdict};
 pub use inspect::{Inspection, inspect};
 pub use pair::{AcrossApis, Comparison, SameApi, Side, compare, pairs};
 pub use registry::{

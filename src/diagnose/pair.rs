@@ -13,6 +13,7 @@
 use super::{
     Api, Finding, KnownIssue, Registry, Sheet, td205_factory_changed, td502_reference_dimensions,
 };
+use crate::recording::Defect;
 
 /// One side of a comparison.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,6 +41,24 @@ pub struct AcrossApis {
     pub av_corrected_px: f64,
     /// Issue 2: ARKit's focal length corrected, at the reference dimensions, pixels.
     pub ar_corrected_px: f64,
+}
+
+impl AcrossApis {
+    /// What is wrong with a recording by this API, after the paper.
+    pub fn defect(&self, api: Api) -> Option<Defect> {
+        // The metadata's focal length over the corrected one.
+        let focal = |ratio: f64| Some(Defect::Focal { ratio });
+        match (self.issue?, api) {
+            (KnownIssue::DepthZoom, Api::ArKit) => {
+                Some(Defect::DepthZoom { zoom: self.depth_zoom })
+            }
+            (KnownIssue::FocalLength, Api::AvFoundation) => focal(1.0 + self.focal_difference),
+            (KnownIssue::FocalLength, Api::ArKit) => {
+                focal(1.0 / (1.0 - 2.0 * self.focal_difference))
+            }
+            _ => None,
+        }
+    }
 }
 
 /// What two sides of one API say together.
@@ -169,6 +188,14 @@ mod tests {
         let at_vga = |px: f64, reference: f64| format!("{:.2}", px * 640.0 / reference);
         assert_eq!(at_vga(pair.av_corrected_px, 2016.0), "525.97");
         assert_eq!(at_vga(pair.ar_corrected_px, 2880.0), "361.58");
+        let sheet = |row: &str| Registry::published().get(row).unwrap().sheet.focal_px;
+        for (api, row, corrected_px) in [
+            (Api::AvFoundation, "ipad-12.9-5gen/ios14/av", pair.av_corrected_px),
+            (Api::ArKit, "ipad-12.9-5gen/ios14/ar", pair.ar_corrected_px),
+        ] {
+            let Some(Defect::Focal { ratio }) = pair.defect(api) else { panic!() };
+            assert!((sheet(row) / ratio - corrected_px).abs() < 1e-9);
+        }
         let zoom = of("ipad-12.9-4gen/v2/av", "ipad-12.9-4gen/v2/ar").across.unwrap().depth_zoom;
         assert_eq!(zoom.map(|z| format!("{z:.4}")), ["0.9507", "0.9507"]);
     }

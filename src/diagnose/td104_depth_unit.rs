@@ -1,7 +1,10 @@
 #![doc = include_str!("td104_depth_unit.md")]
 
-use super::{Case, Code, Correction, Evidence, Finding, Unit, Verdict};
-use crate::solve::{mad_sigma, median};
+use super::{Case, Code, Evidence, Finding, Unit, Verdict};
+use crate::{
+    recording::Defect,
+    solve::{mad_sigma, median},
+};
 
 /// Samples that make a median.
 const LEAST_SAMPLES: usize = 20;
@@ -54,7 +57,7 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
     }
     .to_owned();
     if power != 0.0 {
-        finding.correction = Some(Correction::Depth { scale: unit, bias_m: 0.0 });
+        finding.defect = Some(Defect::DepthScale { ratio: unit });
     }
     finding
 }

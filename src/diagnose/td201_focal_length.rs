@@ -1,9 +1,10 @@
 #![doc = include_str!("td201_focal_length.md")]
 
-use super::{Case, Code, Correction, DistortionState, Evidence, Finding, Unit, Verdict};
+use super::{Case, Code, Evidence, Finding, Unit, Verdict, td503_intrinsics_size};
 use crate::{
     calibrate::{Estimate, KnownCamera, Lens},
     camera::Distortion,
+    recording::{Defect, StreamState},
 };
 
 /// The focal length that this recording speaks for, with everything that makes it unsure.
@@ -51,7 +52,7 @@ enum Origin {
     Given,
 }
 
-pub(super) fn measure(case: &Case<'_>, state: DistortionState) -> Option<Measured> {
+pub(super) fn measure(case: &Case<'_>, state: StreamState) -> Option<Measured> {
     let camera = case.camera?;
     let own_px = camera.intrinsics.focal_px();
     // Each half has √2 the sigma of the whole, their difference twice: half of it is one draw of the whole's error.
@@ -77,7 +78,7 @@ pub(super) fn measure(case: &Case<'_>, state: DistortionState) -> Option<Measure
     let formal = calibration.parameter("focal_px").map(|f| f.sigma);
     let halves = calibration.split_half_focal_px.map(|halves| halves.map(|half| half.value));
     let split_half = halves.map(half_of);
-    let bent = state == DistortionState::Distorted && camera.distortion == Distortion::None;
+    let bent = state == StreamState::Distorted && camera.distortion == Distortion::None;
     let straightened = || {
         let hypotheses = &case.distortion?.hypotheses;
         let under = |lens: Lens| hypotheses.iter().find(|h| h.lens == lens).map(|h| h.focal_px);
@@ -203,7 +204,8 @@ pub(super) fn check(case: &Case<'_>, measured: Option<&Measured>) -> Finding {
         Verdict::Unknown | Verdict::Warning => record.clone_into(&mut finding.what_to_do),
         Verdict::Info | Verdict::Ok => {}
     }
-    finding.correct_if_significant(Correction::Focal { focal_px });
+    let scaled_px = td503_intrinsics_size::scaled(case).map_or(factory_px, |k| k.focal_px());
+    finding.name_if_significant(Defect::Focal { ratio: scaled_px / focal_px });
     finding
 }
 

@@ -1,19 +1,20 @@
 #![doc = include_str!("td202_principal_point.md")]
 
-use super::{Case, Code, Correction, DistortionState, Evidence, Finding, Unit, Verdict};
+use super::{Case, Code, Evidence, Finding, Unit, Verdict, td503_intrinsics_size};
 use crate::{
     calibrate::{Estimate, Lens},
     camera::Intrinsics,
+    recording::{Defect, StreamState},
 };
 
 /// The principal point, free, under what is in the stream.
-fn measured(case: &Case<'_>, state: DistortionState) -> Option<[Estimate; 2]> {
+fn measured(case: &Case<'_>, state: StreamState) -> Option<[Estimate; 2]> {
     let lens = match (state, case.factory?.tables.is_some()) {
-        (DistortionState::Distorted, true) => Lens::InverseTable,
-        (DistortionState::Distorted, false) => Lens::FreeRadial,
-        (DistortionState::Rectified, _) => Lens::None,
-        (DistortionState::RectifiedTwice, _) => Lens::ForwardTable,
-        (DistortionState::Unknown, _) => return None,
+        (StreamState::Distorted, true) => Lens::InverseTable,
+        (StreamState::Distorted, false) => Lens::FreeRadial,
+        (StreamState::Rectified, _) => Lens::None,
+        (StreamState::RectifiedTwice, _) => Lens::ForwardTable,
+        (StreamState::Unknown, _) => return None,
     };
     case.distortion?.hypotheses.iter().find(|h| h.lens == lens).map(|h| h.center_px)
 }
@@ -32,7 +33,7 @@ fn expected(case: &Case<'_>, own: [Estimate; 2]) -> Option<([f64; 2], bool)> {
     }
 }
 
-pub(super) fn check(case: &Case<'_>, state: DistortionState) -> Finding {
+pub(super) fn check(case: &Case<'_>, state: StreamState) -> Finding {
     let mut finding = Finding::new(Code::TD202, Unit::Px);
     let tolerance_px = case.tolerances.principal_point_px;
     finding.tolerance = Some(tolerance_px);
@@ -93,8 +94,9 @@ pub(super) fn check(case: &Case<'_>, state: DistortionState) -> Finding {
         Verdict::Unknown | Verdict::Warning => record.clone_into(&mut finding.what_to_do),
         Verdict::Info | Verdict::Ok => {}
     }
-    finding.correct_if_significant(Correction::PrincipalPoint {
-        center_px: [own[0].value, own[1].value],
-    });
+    if let Some(k) = td503_intrinsics_size::scaled(case) {
+        let shift_px = [k.cx - own[0].value, k.cy - own[1].value];
+        finding.name_if_significant(Defect::Center { shift_px });
+    }
     finding
 }

@@ -1,7 +1,10 @@
 #![doc = include_str!("td203_not_rectified.md")]
 
-use super::{Case, Code, Correction, DistortionState, Evidence, Finding, Unit, Verdict};
-use crate::calibrate::{DistortionTest, Estimate, Lens};
+use super::{Case, Code, Evidence, Finding, Unit, Verdict, depth_state};
+use crate::{
+    calibrate::{DistortionTest, Estimate, Lens},
+    recording::{Defect, StreamState},
+};
 
 /// What to record to be able to tell.
 pub(super) const RECORD: &str = "Record 20 or more frames with the board tilted by 20 to 45 degrees in different \
@@ -11,41 +14,41 @@ pub(super) const RECORD: &str = "Record 20 or more frames with the board tilted 
 const HALFWAY: f64 = 0.5;
 
 /// Which of the three the stream is, at 3 sigma.
-pub(super) fn state(case: &Case<'_>) -> DistortionState {
+pub(super) fn state(case: &Case<'_>) -> StreamState {
     let Some(test) = case.distortion.filter(|_| case.poor_fit().is_none()) else {
-        return DistortionState::Unknown;
+        return StreamState::Unknown;
     };
     let tolerance_px = case.tolerances.distortion_px;
     match test.amplitude {
         Some(Estimate { value, sigma }) => {
             let reach = 3.0 * sigma;
             if value - reach > HALFWAY {
-                DistortionState::Distorted
+                StreamState::Distorted
             } else if value + reach < -HALFWAY {
-                DistortionState::RectifiedTwice
+                StreamState::RectifiedTwice
             } else if value + reach < HALFWAY && value - reach > -HALFWAY {
-                DistortionState::Rectified
+                StreamState::Rectified
             } else {
-                DistortionState::Unknown
+                StreamState::Unknown
             }
         }
         // Without a table a displacement is all there is to judge by, and which way it goes is the lens' own affair.
         None => match Verdict::of(test.corner_shift_px, tolerance_px) {
-            Verdict::Fault => DistortionState::Distorted,
-            Verdict::Ok | Verdict::Info => DistortionState::Rectified,
-            Verdict::Unknown | Verdict::Warning => DistortionState::Unknown,
+            Verdict::Fault => StreamState::Distorted,
+            Verdict::Ok | Verdict::Info => StreamState::Rectified,
+            Verdict::Unknown | Verdict::Warning => StreamState::Unknown,
         },
     }
 }
 
 /// What the file says, for the end of a summary; and whether it contradicts the pixels.
-fn claim(case: &Case<'_>, state: DistortionState) -> (&'static str, bool) {
+fn claim(case: &Case<'_>, state: StreamState) -> (&'static str, bool) {
     let flag = case.factory.and_then(|f| f.geometric_distortion_correction);
     match (flag, state) {
-        (Some(true), DistortionState::Distorted) => {
+        (Some(true), StreamState::Distorted) => {
             (" The file says that Apple's correction was on, and is wrong.", true)
         }
-        (Some(false), DistortionState::Rectified) => (
+        (Some(false), StreamState::Rectified) => (
             " The file says that Apple's correction was off, and is wrong or means another stream.",
             true,
         ),
@@ -106,10 +109,10 @@ pub(super) fn numbers(test: &DistortionTest) -> String {
 }
 
 /// What the depth map's slopes and its print say of its own state, for the end of a summary.
-fn of_depth(state: DistortionState, depth: DistortionState, share: Option<Estimate>) -> String {
+fn of_depth(state: StreamState, depth: StreamState, share: Option<Estimate>) -> String {
     let Some(Estimate { value, sigma }) = share else { return String::new() };
     let how = match depth {
-        DistortionState::Unknown => "Whether depth is, too, this recording does not tell",
+        StreamState::Unknown => "Whether depth is, too, this recording does not tell",
         same if same == state => "Depth is, too",
         _ => "Depth is not as colour is",
     };
@@ -128,7 +131,7 @@ pub(super) fn why_unknown(case: &Case<'_>) -> String {
     })
 }
 
-pub(super) fn check(case: &Case<'_>, state: DistortionState) -> Finding {
+pub(super) fn check(case: &Case<'_>, state: StreamState) -> Finding {
     let mut finding = Finding::new(Code::TD203, Unit::Px);
     finding.tolerance = Some(case.tolerances.distortion_px);
     let (claim, contradicted) = claim(case, state);
@@ -145,39 +148,37 @@ pub(super) fn check(case: &Case<'_>, state: DistortionState) -> Finding {
     finding.evidence = evidence(test);
     let (verdict, words, remainder) = match state {
         // A table of less than the tolerance harms nobody.
-        DistortionState::Distorted if by_size == Verdict::Fault => {
+        StreamState::Distorted if by_size == Verdict::Fault => {
             (Verdict::Fault, "The stream is not rectified", "")
         }
-        DistortionState::Distorted => (Verdict::Info, "The stream is not rectified", ""),
-        DistortionState::RectifiedTwice => {
+        StreamState::Distorted => (Verdict::Info, "The stream is not rectified", ""),
+        StreamState::RectifiedTwice => {
             (Verdict::Info, "The stream is bent the other way (TD204)", "")
         }
         // Not the table's doing, and perhaps the board's: a fact, but no state of the stream that could be undone.
-        DistortionState::Rectified if by_size == Verdict::Fault => (
+        StreamState::Rectified if by_size == Verdict::Fault => (
             Verdict::Warning,
             "The stream is rectified",
             ". What remains is more than the tolerance",
         ),
-        DistortionState::Rectified if by_size == Verdict::Unknown => (
+        StreamState::Rectified if by_size == Verdict::Unknown => (
             Verdict::Info,
             "The stream is rectified",
             ". A remainder of more than the tolerance is not excluded",
         ),
-        DistortionState::Rectified if contradicted => {
-            (Verdict::Info, "The stream is rectified", "")
-        }
-        DistortionState::Rectified => (by_size, "The stream is rectified", ""),
-        DistortionState::Unknown => {
+        StreamState::Rectified if contradicted => (Verdict::Info, "The stream is rectified", ""),
+        StreamState::Rectified => (by_size, "The stream is rectified", ""),
+        StreamState::Unknown => {
             (Verdict::Unknown, "Cannot tell whether the stream is rectified", "")
         }
     };
     finding.verdict = verdict;
     let share = case.registration.and_then(|r| r.lens_share);
     finding.evidence.extend(share.map(|s| Evidence::estimate("depth_share_of_other_state", s)));
-    let depth = state.of_depth(share);
+    let depth = depth_state(state, share);
     finding.summary =
         format!("{words}: {}{remainder}.{claim}{}", numbers(test), of_depth(state, depth, share));
-    if depth != DistortionState::Unknown && depth != state {
+    if depth != StreamState::Unknown && depth != state {
         finding.verdict = Verdict::Warning;
         finding.what_to_do = format!(
             "Colour is {}, depth is {}: find out what has resampled one of them alone, and record again without it. No \
@@ -188,9 +189,8 @@ pub(super) fn check(case: &Case<'_>, state: DistortionState) -> Finding {
         return finding;
     }
     match state {
-        DistortionState::Distorted => {
-            let tables = case.factory.and_then(|f| f.tables.clone()).map(Box::new);
-            finding.what_to_do = if tables.is_some() {
+        StreamState::Distorted => {
+            finding.what_to_do = if case.factory.is_some_and(|f| f.tables.is_some()) {
                 "Take corners and pixels through the inverse table before a pinhole is assumed, or resample colour and \
                  depth with the forward table. Apple distorts depth just as colour: every point off the axis lies \
                  sideways of where the pinhole puts it."
@@ -199,14 +199,14 @@ pub(super) fn check(case: &Case<'_>, state: DistortionState) -> Finding {
                  Apple distorts depth just as colour."
             }
             .to_owned();
-            finding.correction = Some(Correction::Undistort { tables });
+            finding.defect = Some(Defect::Distorted);
         }
-        DistortionState::Rectified if shift.value.abs() > 3.0 * shift.sigma => {
+        StreamState::Rectified if shift.value.abs() > 3.0 * shift.sigma => {
             finding.what_to_do =
                 "Nothing; do not apply the lookup tables to this stream.".to_owned();
         }
-        DistortionState::Rectified | DistortionState::RectifiedTwice => {}
-        DistortionState::Unknown => RECORD.clone_into(&mut finding.what_to_do),
+        StreamState::Rectified | StreamState::RectifiedTwice => {}
+        StreamState::Unknown => RECORD.clone_into(&mut finding.what_to_do),
     }
     finding
 }

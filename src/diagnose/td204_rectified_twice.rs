@@ -1,11 +1,12 @@
 #![doc = include_str!("td204_rectified_twice.md")]
 
 use super::{
-    Case, Code, DistortionState, Finding, Unit, Verdict,
+    Case, Code, Finding, Unit, Verdict,
     td203_not_rectified::{RECORD, evidence, numbers, why_unknown},
 };
+use crate::recording::{Defect, StreamState};
 
-pub(super) fn check(case: &Case<'_>, state: DistortionState) -> Finding {
+pub(super) fn check(case: &Case<'_>, state: StreamState) -> Finding {
     let mut finding = Finding::new(Code::TD204, Unit::Px);
     finding.tolerance = Some(case.tolerances.distortion_px);
     let Some(test) = case.distortion.filter(|_| case.poor_fit().is_none()) else {
@@ -21,18 +22,19 @@ pub(super) fn check(case: &Case<'_>, state: DistortionState) -> Finding {
     finding.sigma = Some(sigma);
     finding.evidence = evidence(test);
     let words = match state {
-        DistortionState::RectifiedTwice => {
+        StreamState::RectifiedTwice => {
             finding.verdict = Verdict::Fault;
+            finding.defect = Some(Defect::RectifiedTwice);
             finding.what_to_do = "Do not apply the lookup table to this stream: it was straight already. Go back to \
                                   the images as recorded."
                 .to_owned();
             "The stream was rectified twice"
         }
-        DistortionState::Distorted | DistortionState::Rectified => {
+        StreamState::Distorted | StreamState::Rectified => {
             finding.verdict = Verdict::Ok;
             "The stream was not rectified twice"
         }
-        DistortionState::Unknown => {
+        StreamState::Unknown => {
             RECORD.clone_into(&mut finding.what_to_do);
             "Cannot tell whether the stream was rectified twice"
         }

@@ -1,9 +1,7 @@
 #![doc = include_str!("td301_depth_scale.md")]
 
-use super::{
-    Case, Code, Correction, Evidence, Finding, Unit, Verdict, td201_focal_length::Measured,
-};
-use crate::{calibrate::Estimate, depth::Registration};
+use super::{Case, Code, Evidence, Finding, Unit, Verdict, td201_focal_length::Measured};
+use crate::{calibrate::Estimate, depth::Registration, recording::Defect};
 
 /// What to record for a line of depth over distance.
 pub(super) const RECORD: &str = "Record the board at several distances (0.2 m to 0.5 m), 20 or more frames, tilted in \
@@ -194,6 +192,6 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
         Verdict::Unknown | Verdict::Warning => RECORD.clone_into(&mut finding.what_to_do),
         Verdict::Info | Verdict::Ok => {}
     }
-    finding.correct_if_significant(Correction::Depth { scale, bias_m: 0.0 });
+    finding.name_if_significant(Defect::DepthScale { ratio: scale });
     finding
 }

@@ -1,10 +1,11 @@
 #![doc = include_str!("td302_depth_bias.md")]
 
 use super::{
-    Case, Code, Correction, Evidence, Finding, Unit, Verdict,
+    Case, Code, Evidence, Finding, Unit, Verdict,
     td201_focal_length::Measured,
     td301_depth_scale::{RECORD, Scaled, basis, divisor},
 };
+use crate::recording::Defect;
 
 pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
     let mut finding = Finding::new(Code::TD302, Unit::Mm);
@@ -76,7 +77,7 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
     }
     // Where the scale tells it all nothing is left.
     if bias_m.abs() > 1e-6 {
-        finding.correct_if_significant(Correction::Depth { scale: 1.0, bias_m });
+        finding.name_if_significant(Defect::DepthBias { bias_m });
     }
     finding
 }

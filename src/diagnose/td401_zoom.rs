@@ -1,10 +1,10 @@
 #![doc = include_str!("td401_zoom.md")]
 
 use super::{
-    Case, Code, Correction, Evidence, Finding, Unit, Verdict, td201_focal_length::Measured,
+    Case, Code, Evidence, Finding, Unit, Verdict, td201_focal_length::Measured,
     td301_depth_scale::basis,
 };
-use crate::{calibrate::Estimate, depth::Registration};
+use crate::{calibrate::Estimate, depth::Registration, recording::Defect};
 
 /// What makes zoom and shift observable.
 pub(super) const RECORD: &str = "Record 20 or more frames with the board tilted by 20 to 45 degrees to all sides, at \
@@ -64,7 +64,7 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
         Verdict::Unknown | Verdict::Warning => RECORD.clone_into(&mut finding.what_to_do),
         Verdict::Info | Verdict::Ok => {}
     }
-    finding.correct_if_significant(Correction::Align { zoom: zoom.value, shift_px: [0.0; 2] });
+    finding.name_if_significant(Defect::DepthZoom { zoom: [zoom.value; 2] });
     finding
 }
 

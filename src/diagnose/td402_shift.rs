@@ -1,12 +1,12 @@
 #![doc = include_str!("td402_shift.md")]
 
 use super::{
-    Case, Code, Correction, Evidence, Finding, Unit, Verdict,
+    Case, Code, Evidence, Finding, Unit, Verdict,
     td201_focal_length::Measured,
     td301_depth_scale::basis,
     td401_zoom::{RECORD, by_what, witnesses},
 };
-use crate::calibrate::Estimate;
+use crate::{calibrate::Estimate, recording::Defect};
 
 pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
     let mut finding = Finding::new(Code::TD402, Unit::Px);
@@ -63,7 +63,7 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
         Verdict::Unknown | Verdict::Warning => RECORD.clone_into(&mut finding.what_to_do),
         Verdict::Info | Verdict::Ok => {}
     }
-    finding.correct_if_significant(Correction::Align { zoom: 1.0, shift_px: [x.value, y.value] });
+    finding.name_if_significant(Defect::DepthShift { shift_px: [x.value, y.value] });
     finding
 }
 

@@ -1,7 +1,7 @@
 #![doc = include_str!("td403_mirrored.md")]
 
-use super::{Case, Code, Correction, Evidence, Finding, Unit, Verdict};
-use crate::depth::Handedness;
+use super::{Case, Code, Evidence, Finding, Unit, Verdict};
+use crate::{depth::Handedness, recording::Defect};
 
 pub(super) fn check(case: &Case<'_>) -> Finding {
     let mut finding = Finding::new(Code::TD403, Unit::Count);
@@ -28,7 +28,7 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
         finding.what_to_do = "Mirror colour and depth back, and the principal point with them. Make sure first that \
                               the board is not printed mirrored or seen through its back."
             .to_owned();
-        finding.correction = Some(Correction::Unmirror);
+        finding.defect = Some(Defect::Mirrored);
     } else if mirrored > 0 {
         finding.verdict = Verdict::Warning;
         finding.summary = format!(
@@ -69,7 +69,7 @@ fn add_depth(finding: &mut Finding, depth: Handedness) {
         // Colour mirrored and depth straight: it is colour that has to be turned, and that is what the finding says.
         if colour != Verdict::Fault {
             finding.what_to_do = "Mirror the depth maps back, left for right.".to_owned();
-            finding.correction = Some(Correction::UnmirrorDepth);
+            finding.defect = Some(Defect::DepthMirrored);
         }
     } else if n_straight >= LEAST_FRAMES {
         finding.summary += &format!(

@@ -1,8 +1,6 @@
 #![doc = include_str!("td502_reference_dimensions.md")]
 
-use super::{
-    AcrossApis, Case, Code, Correction, Evidence, Finding, KnownIssue, Sheet, Unit, Verdict,
-};
+use super::{AcrossApis, Api, Case, Code, Evidence, Finding, KnownIssue, Sheet, Unit, Verdict};
 
 /// Within one recording there is nothing to disagree with; the numbers are stated.
 pub(super) fn check(case: &Case<'_>) -> Finding {
@@ -73,7 +71,7 @@ pub(super) fn between(av: &Sheet, ar: &Sheet, across: &AcrossApis) -> Finding {
                 "Calibrate (`truedepth audit`), which is better than the equations; they are for \
                                   devices that cannot be calibrated any more."
                     .to_owned();
-            finding.correction = Some(Correction::Focal { focal_px: vga_px });
+            finding.defect = across.defect(Api::AvFoundation);
         }
         None => {
             finding.verdict = Verdict::Ok;

@@ -2,10 +2,7 @@
 
 use std::sync::LazyLock;
 
-use super::{
-    Api, Case, Code, Correction, DistortionState, Finding, Sheet, Side, Tolerances, Verdict,
-    compare, diagnose,
-};
+use super::{Api, Case, Code, Finding, Sheet, Side, Tolerances, Verdict, compare, diagnose};
 use crate::{
     board::{CharucoBoard, Layout},
     calibrate::{FrameCorners, Input, Method, Model, calibrate, distortion_test},
@@ -17,7 +14,7 @@ use crate::{
     detect::{Corner, Identity, Observation},
     geom::{Board, Color, Pixel, Pose, Rotation, Vector3},
     pose::{View, Weighting},
-    recording::{Factory, Problem},
+    recording::{Defect, Factory, Problem, StreamState},
 };
 
 static BOARD: LazyLock<CharucoBoard> = LazyLock::new(|| CharucoBoard::paper(0.020875).unwrap());
@@ -144,7 +141,7 @@ impl World {
         }
     }
 
-    fn judge(&self) -> (Vec<Finding>, DistortionState) {
+    fn judge(&self) -> (Vec<Finding>, StreamState) {
         let mut noise = Noise(11);
         let mut observations = Vec::new();
         let mut factory_views = Vec::new();
@@ -268,11 +265,11 @@ impl World {
 fn a_true_recording_has_no_fault() {
     let (findings, state) = World::true_one().judge();
     assert_eq!(findings.iter().map(|f| f.code).collect::<Vec<_>>(), Code::ALL);
-    assert_eq!(state, DistortionState::Rectified);
+    assert_eq!(state, StreamState::Rectified);
     for finding in &findings {
         assert!(matches!(finding.verdict, Verdict::Ok | Verdict::Info), "{finding:?}");
         assert!(!finding.summary.is_empty() && finding.summary.ends_with('.'), "{finding:?}");
-        assert!(finding.correction.is_none(), "{finding:?}");
+        assert!(finding.defect.is_none(), "{finding:?}");
     }
 }
 
@@ -283,8 +280,8 @@ fn a_wrong_focal_length_is_one_fault_and_no_other() {
     assert_eq!(world.faults(), [Code::TD201]);
     let finding = world.finding(Code::TD201);
     assert!((finding.value.unwrap() - 100.0 * (1.0 / 1.06 - 1.0)).abs() < 1e-9);
-    let Some(Correction::Focal { focal_px }) = finding.correction else { panic!() };
-    assert!((focal_px - 596.0).abs() < 1e-9);
+    let Some(Defect::Focal { ratio }) = finding.defect else { panic!() };
+    assert!((ratio - 1.06).abs() < 1e-9);
 }
 
 #[test]
@@ -296,11 +293,11 @@ fn a_distorted_stream() {
         world.own = Some(Camera { intrinsics: pinhole(596.0), distortion });
         assert_eq!(world.faults(), [Code::TD203]);
         let (findings, state) = world.judge();
-        assert_eq!(state, DistortionState::Distorted);
+        assert_eq!(state, StreamState::Distorted);
         let finding = findings.iter().find(|f| f.code == Code::TD203).unwrap();
         // 4 px along the diagonal at the corner.
         assert!((finding.value.unwrap() - 4.0).abs() < 0.15, "{finding:?}");
-        assert!(matches!(finding.correction, Some(Correction::Undistort { tables: Some(_) })));
+        assert_eq!(finding.defect, Some(Defect::Distorted));
     }
 }
 
@@ -317,7 +314,7 @@ fn rectified_twice() {
     .unwrap();
     world.truth.distortion = Distortion::Table(TablePair::from_inverse(swapped));
     let (_, state) = world.judge();
-    assert_eq!(state, DistortionState::RectifiedTwice);
+    assert_eq!(state, StreamState::RectifiedTwice);
     assert_eq!(world.faults(), [Code::TD204]);
     assert!(world.finding(Code::TD204).value.unwrap() > 2.0);
 }
@@ -367,7 +364,7 @@ fn mirrored() {
     let mut world = World::true_one();
     world.mirrored = true;
     assert_eq!(world.faults(), [Code::TD403]);
-    assert_eq!(world.finding(Code::TD403).correction, Some(Correction::Unmirror));
+    assert_eq!(world.finding(Code::TD403).defect, Some(Defect::Mirrored));
 }
 
 #[test]
@@ -380,7 +377,7 @@ fn intrinsics_left_at_the_reference_size() {
     world.factory.reference_dimensions = Some([3088.0, 2316.0]);
     let finding = world.finding(Code::TD503);
     assert_eq!(finding.verdict, Verdict::Fault);
-    let Some(Correction::ScaleIntrinsics { factor: [x, y] }) = finding.correction else { panic!() };
+    let Some(Defect::IntrinsicsScale { factor: [x, y] }) = finding.defect else { panic!() };
     assert!((x * by - 1.0).abs() < 1e-9 && (y * by - 1.0).abs() < 1e-9);
     assert_eq!(world.finding(Code::TD504).verdict, Verdict::Fault);
 }
@@ -408,8 +405,7 @@ fn a_zoomed_depth_map_is_one_fault_and_no_other() {
         let finding = world.finding(Code::TD401);
         let (value, sigma) = (finding.value.unwrap(), finding.sigma.unwrap());
         assert!((value - 100.0 * (zoom - 1.0)).abs() < 3.0 * sigma && sigma < 0.2, "{finding:?}");
-        let Some(Correction::Align { zoom: found, shift_px: [0.0, 0.0] }) = finding.correction
-        else {
+        let Some(Defect::DepthZoom { zoom: [found, _] }) = finding.defect else {
             panic!("{finding:?}")
         };
         assert!((found - zoom).abs() < 0.005);
@@ -421,7 +417,7 @@ fn a_shifted_depth_map_is_one_fault_and_no_other() {
     let world = World { shift_px: [3.0, -2.0], ..World::true_one() };
     assert_eq!(world.faults(), [Code::TD402]);
     let finding = world.finding(Code::TD402);
-    let Some(Correction::Align { zoom: 1.0, shift_px: [x, y] }) = finding.correction else {
+    let Some(Defect::DepthShift { shift_px: [x, y] }) = finding.defect else {
         panic!("{finding:?}")
     };
     let sigma = finding.sigma.unwrap();
@@ -433,7 +429,7 @@ fn a_mirrored_depth_map() {
     let world = World { depth_mirrored: true, ..World::true_one() };
     let finding = world.finding(Code::TD403);
     assert_eq!(finding.verdict, Verdict::Fault, "{finding:?}");
-    assert_eq!(finding.correction, Some(Correction::UnmirrorDepth));
+    assert_eq!(finding.defect, Some(Defect::DepthMirrored));
     assert_eq!(World::true_one().finding(Code::TD403).verdict, Verdict::Ok);
 }
 
@@ -443,7 +439,7 @@ fn units_and_steps() {
     let world = World { scale: 10.0, ..World::true_one() };
     let finding = world.finding(Code::TD104);
     assert_eq!(finding.verdict, Verdict::Fault, "{finding:?}");
-    assert_eq!(finding.correction, Some(Correction::Depth { scale: 10.0, bias_m: 0.0 }));
+    assert_eq!(finding.defect, Some(Defect::DepthScale { ratio: 10.0 }));
 
     let steps = DepthSteps { n_levels: 180, step_share: 0.012 };
     let world = World { steps, ..World::true_one() };
@@ -461,10 +457,8 @@ fn a_wrong_principal_point() {
     world.factory.intrinsics.cx += 6.0;
     let finding = world.finding(Code::TD202);
     assert_eq!(finding.verdict, Verdict::Fault, "{finding:?}");
-    let Some(Correction::PrincipalPoint { center_px: [x, y] }) = finding.correction else {
-        panic!("{finding:?}")
-    };
-    assert!((x - 318.9).abs() < 1.0 && (y - 239.8).abs() < 1.0, "{finding:?}");
+    let Some(Defect::Center { shift_px: [x, y] }) = finding.defect else { panic!("{finding:?}") };
+    assert!((x - 6.0).abs() < 1.0 && y.abs() < 1.0, "{finding:?}");
 }
 
 /// Mirrored images have their principal point mirrored: one fault (TD403), not two.
@@ -526,7 +520,7 @@ fn no_verdict_from_a_calibration_that_does_not_fit() {
     world.calibrated_rms_px = Some(4.8);
     assert_eq!(world.faults(), []);
     let (findings, state) = world.judge();
-    assert_eq!(state, DistortionState::Unknown);
+    assert_eq!(state, StreamState::Unknown);
     for code in [Code::TD201, Code::TD202, Code::TD203, Code::TD204, Code::TD301, Code::TD401] {
         let finding = findings.iter().find(|f| f.code == code).unwrap();
         assert_eq!(finding.verdict, Verdict::Unknown, "{finding:?}");

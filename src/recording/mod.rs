@@ -25,10 +25,13 @@
 //! # Ok::<(), truedepth::recording::Error>(())
 //! ```
 //!
+//! What can be wrong with a recording is a [`Defect`].
+//!
 //! Not here: what the images show, whether the metadata are true.
 
 mod archive;
 mod board_file;
+mod defect;
 mod discover;
 mod error;
 #[cfg(feature = "fs")]
@@ -50,6 +53,7 @@ mod zeiss;
 
 pub use archive::Archive;
 pub use board_file::{board_from_toml, board_to_toml};
+pub use defect::{Defect, DefectError, StreamState};
 pub use discover::{Found, discover_in};
 #[cfg(feature = "fs")]
 pub use discover::{discover, discover_nested};

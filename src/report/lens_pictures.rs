@@ -8,13 +8,11 @@ use super::{
 };
 use crate::{
     board::CharucoBoard,
-    correct::{
-        self, BoardLine, ColorWarp, Rectifier, Straightness, StreamState, Treatment, board_lines,
-    },
+    correct::{self, BoardLine, ColorWarp, Rectifier, Straightness, Treatment, board_lines},
     detect::{Detector, Observation},
     geom::Pixel,
     image::Rgb,
-    recording::{Recording, Sink},
+    recording::{Recording, Sink, StreamState},
 };
 
 /// Bows are drawn so many times larger than they are.
@@ -204,7 +202,7 @@ pub fn state_in_words(rectifier: &Rectifier, straightness: &Straightness) -> Str
          {inverse:.2} px"
     );
     match straightness.state() {
-        StreamState::Straight => format!("Already straight: {numbers}."),
+        StreamState::Rectified => format!("Already straight: {numbers}."),
         StreamState::Distorted => {
             format!("Not rectified: {numbers}. `truedepth correct` takes the distortion out.")
         }

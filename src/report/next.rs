@@ -39,7 +39,7 @@ pub(super) fn next_steps(audit: &Audit, typed: &Typed) -> Vec<NextStep> {
     let is_open =
         |f: &&Finding| matches!(f.verdict, Verdict::Fault | Verdict::Warning | Verdict::Unknown);
     let mut steps = Vec::new();
-    let can_correct = |f: &Finding| f.verdict == Verdict::Fault && f.correction.is_some();
+    let can_correct = |f: &Finding| f.verdict == Verdict::Fault && f.defect.is_some();
     if audit.findings.iter().any(can_correct) {
         let with =
             typed.report.as_ref().map_or(String::new(), |r| format!(" --with {}", quoted(r)));

@@ -17,13 +17,11 @@ use crate::{
         against_board, patches,
     },
     detect::{Corner, Identity, Observation, Reason, Reject},
-    diagnose::{
-        Code, Correction, Device, DistortionState, Evidence, Finding, Sensor, Unit, Verdict,
-    },
+    diagnose::{Code, Device, Evidence, Finding, Sensor, Unit, Verdict},
     geom::{Board, Color, Pixel, Pose, Rotation, Vector3},
     image::{DepthMap, Rgb},
     pose::View,
-    recording::{Factory, Limits, Memory, Problem, Recording, Writer},
+    recording::{Defect, Factory, Limits, Memory, Problem, Recording, StreamState, Writer},
 };
 
 const N_FRAMES: usize = 12;
@@ -66,8 +64,8 @@ pub(super) fn audit() -> Audit {
         handedness: None,
         distortion: calibration.distortion.clone(),
         calibration: Some(calibration),
-        distortion_state: DistortionState::Rectified,
-        depth_distortion_state: DistortionState::Rectified,
+        distortion_state: StreamState::Rectified,
+        depth_distortion_state: StreamState::Rectified,
         findings: findings(),
         frames,
         board,
@@ -338,7 +336,7 @@ fn findings() -> Vec<Finding> {
                 Evidence { name: "focal_px", value: OWN_FOCAL_PX, sigma: Some(0.352) },
             ],
             what_to_do: "Use 530.04 px wherever the factory's focal length is used at 640x480.".to_owned(),
-            correction: Some(Correction::Focal { focal_px: OWN_FOCAL_PX }),
+            defect: Some(Defect::Focal { ratio: FACTORY_FOCAL_PX / OWN_FOCAL_PX }),
             ..base(Code::TD201, Verdict::Fault, Unit::Percent)
         },
         Finding {

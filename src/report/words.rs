@@ -5,7 +5,8 @@ use crate::{
     audit::Audit,
     calibrate::{Estimate, Model},
     depth::BoardDepth,
-    diagnose::{Code, DistortionState, Finding, Sensor, Unit, Verdict},
+    diagnose::{Code, Finding, Sensor, Unit, Verdict},
+    recording::StreamState,
 };
 
 /// One line of the table of quantities.
@@ -115,7 +116,7 @@ fn row(audit: &Audit, finding: &Finding) -> Row {
         Code::TD203 => {
             let (color, depth) = (audit.distortion_state, audit.depth_distortion_state);
             let depth = match depth {
-                DistortionState::Unknown => String::new(),
+                StreamState::Unknown => String::new(),
                 same if same == color => ", depth too".to_owned(),
                 other => format!(", depth {}", other.name()),
             };

@@ -8,8 +8,9 @@ use super::{
 use crate::{
     audit::{self, Audit, Method, Options, audit},
     calibrate::{Estimate, KnownCamera},
-    correct::{Rectifier, Straightness, StreamState, Treatment, board_lines},
+    correct::{Rectifier, Straightness, Treatment, board_lines},
     diagnose::{Entry, Registry, Sheet},
+    recording::StreamState,
 };
 
 /// The paper, reproduced.
@@ -334,7 +335,7 @@ fn straightness(lens: &[Lens]) -> Section {
                 "px",
             );
             checks.push(match (treatment, one.straightness.state()) {
-                (Treatment::Original, StreamState::Straight) => {
+                (Treatment::Original, StreamState::Rectified) => {
                     check.noted("straight as recorded: the paper is right here")
                 }
                 (Treatment::Original, StreamState::Distorted) => {

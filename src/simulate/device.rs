@@ -3,7 +3,7 @@
 use crate::{
     camera::{Intrinsics, RadialTable, TablePair},
     geom::Pixel,
-    recording::Factory,
+    recording::{Factory, StreamState},
 };
 
 /// A device as its own metadata describe it, and its lens.
@@ -26,34 +26,12 @@ pub struct Device {
     /// Distortion centre at the reference dimensions, pixels.
     pub distortion_center: Pixel,
     /// Whether images are delivered rectified (`GeometricDistortionCorrectionEnabled`).
-    pub stream: Stream,
+    pub stream: StreamState,
     /// The lens: forward magnification minus one is Σ c_k ρ^(2k), ρ the distance from the distortion centre over that
     /// of the farthest corner.
     pub lens: [f64; 5],
     /// Whether the app wrote the lookup tables. The one of 2021 did not.
     pub tables_in_file: bool,
-}
-
-/// What was done to the images after the lens drew them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stream {
-    /// Straight lines are straight.
-    Rectified,
-    /// Nothing: as the lens drew them.
-    Distorted,
-    /// The correction was applied to what was straight already.
-    RectifiedTwice,
-}
-
-impl Stream {
-    /// `rectified`, `distorted` or `rectified_twice`.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Rectified => "rectified",
-            Self::Distorted => "distorted",
-            Self::RectifiedTwice => "rectified_twice",
-        }
-    }
 }
 
 /// A name that no device has.
@@ -78,7 +56,7 @@ const IPHONE_11_PRO: Device = Device {
     focal_px: 2750.68,
     center: Pixel::new(2026.13, 1508.71),
     distortion_center: Pixel::new(2026.13, 1508.71),
-    stream: Stream::Distorted,
+    stream: StreamState::Distorted,
     lens: PHONE,
     tables_in_file: false,
 };
@@ -93,7 +71,7 @@ impl Device {
             focal_px: 1780.13,
             center: Pixel::new(1009.89, 759.69),
             distortion_center: Pixel::new(1009.73, 759.42),
-            stream: Stream::Rectified,
+            stream: StreamState::Rectified,
             lens: ULTRA_WIDE,
             tables_in_file: true,
         },
@@ -104,7 +82,7 @@ impl Device {
             focal_px: 2872.52,
             center: Pixel::new(1535.93, 1157.79),
             distortion_center: Pixel::new(1535.93, 1157.79),
-            stream: Stream::Distorted,
+            stream: StreamState::Distorted,
             lens: MILD,
             tables_in_file: true,
         },
@@ -115,7 +93,7 @@ impl Device {
             focal_px: 1784.44,
             center: Pixel::new(1014.24, 757.43),
             distortion_center: Pixel::new(1013.80, 757.30),
-            stream: Stream::Rectified,
+            stream: StreamState::Rectified,
             lens: ULTRA_WIDE,
             tables_in_file: true,
         },
@@ -126,7 +104,7 @@ impl Device {
             focal_px: 2882.66,
             center: Pixel::new(1541.02, 1155.53),
             distortion_center: Pixel::new(1541.02, 1155.53),
-            stream: Stream::Distorted,
+            stream: StreamState::Distorted,
             lens: MILD,
             tables_in_file: true,
         },
@@ -290,7 +268,7 @@ mod tests {
             assert!(mismatch_px < 0.1, "{}: {mismatch_px} px", device.name);
             let largest = tables.forward.magnification.iter().map(|m| m.abs()).fold(0.0, f64::max);
             let expected =
-                if device.stream == Stream::Rectified { 0.05..0.12 } else { 0.008..0.012 };
+                if device.stream == StreamState::Rectified { 0.05..0.12 } else { 0.008..0.012 };
             assert!(expected.contains(&largest), "{}: {largest}", device.name);
         }
     }

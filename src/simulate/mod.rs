@@ -60,8 +60,8 @@ mod sensor;
 mod random;
 mod truth;
 
-pub use device::{Device, Stream, UnknownDevice};
-pub use fault::{Fault, FaultError, Faults};
+pub use device::{Device, UnknownDevice};
+pub use fault::Faults;
 pub use glimpse::Glimpse;
 pub use plan::{Plan, SimulatedFrame};
 pub use render::{Rendered, render};

@@ -1,8 +1,8 @@
 //! From a device and its faults to a recording.
 
 use super::{
-    device::{Device, Stream},
-    fault::{Fault, Faults},
+    device::Device,
+    fault::Faults,
     render::render_frame,
     scene::{Light, Noise, Scene, Tone, TrueCorner},
     sensor::{DepthSensor, measure_frame},
@@ -16,7 +16,7 @@ use crate::{
     camera::{Camera, Distortion, Intrinsics, RadialTable, TablePair},
     geom::Pixel,
     image::{DepthMap, Rgb},
-    recording::{Error, Factory, Sink, Writer, encode_depth},
+    recording::{Defect, Error, Factory, Sink, StreamState, Writer, encode_depth},
 };
 
 /// What to simulate: everything that follows is decided by these fields.
@@ -77,13 +77,13 @@ impl Plan {
     /// The camera as it is. Its images may then be mirrored ([`is_mirrored`](Self::is_mirrored)).
     pub fn true_camera(&self) -> Camera {
         let mut intrinsics = self.device.factory_intrinsics();
-        for fault in self.faults.iter() {
-            match fault {
-                Fault::Focal { excess } => {
-                    intrinsics.fx /= 1.0 + excess;
-                    intrinsics.fy /= 1.0 + excess;
+        for defect in self.faults.defects() {
+            match defect {
+                Defect::Focal { ratio } => {
+                    intrinsics.fx /= ratio;
+                    intrinsics.fy /= ratio;
                 }
-                Fault::Center { shift_px: [x, y] } => {
+                Defect::Center { shift_px: [x, y] } => {
                     intrinsics.cx -= x;
                     intrinsics.cy -= y;
                 }
@@ -98,59 +98,74 @@ impl Plan {
 
     /// The metadata of every frame.
     pub fn factory(&self) -> Factory {
-        let claims_rectified = self.device.stream == Stream::Rectified
-            || self.faults.iter().any(|f| matches!(f, Fault::Distorted | Fault::RectifiedTwice));
-        self.device.factory(claims_rectified)
+        let claims_rectified = self.device.stream == StreamState::Rectified
+            || self.has(Defect::Distorted)
+            || self.has(Defect::RectifiedTwice);
+        let mut factory = self.device.factory(claims_rectified);
+        for defect in self.faults.defects() {
+            if let Defect::IntrinsicsScale { factor: [x, y] } = defect {
+                let k = &mut factory.intrinsics;
+                (k.fx, k.cx, k.fy, k.cy) = (k.fx / x, k.cx / x, k.fy / y, k.cy / y);
+            }
+        }
+        factory
+    }
+
+    fn has(&self, defect: Defect) -> bool {
+        self.faults.defects().contains(&defect)
     }
 
     /// What was done to the images after the lens drew them.
-    pub fn stream(&self) -> Stream {
-        let of = |fault: Fault| match fault {
-            Fault::Distorted => Some(Stream::Distorted),
-            Fault::RectifiedTwice => Some(Stream::RectifiedTwice),
-            _ => None,
-        };
-        self.faults.iter().find_map(of).unwrap_or(self.device.stream)
+    pub fn stream(&self) -> StreamState {
+        if self.has(Defect::Distorted) {
+            StreamState::Distorted
+        } else if self.has(Defect::RectifiedTwice) {
+            StreamState::RectifiedTwice
+        } else {
+            self.device.stream
+        }
     }
 
     /// The table that takes a pixel of the image to its rectilinear place; `None` for a rectified stream.
     pub(super) fn undistortion(&self) -> Option<RadialTable> {
         let tables = self.device.tables();
         match self.stream() {
-            Stream::Rectified => None,
-            Stream::Distorted => Some(tables.inverse),
+            StreamState::Rectified | StreamState::Unknown => None,
+            StreamState::Distorted => Some(tables.inverse),
             // The second correction moved each pixel as the inverse table says; the forward table brings it back.
-            Stream::RectifiedTwice => Some(tables.forward),
+            StreamState::RectifiedTwice => Some(tables.forward),
         }
     }
 
     /// Whether colour and depth are mirrored left for right.
     pub fn is_mirrored(&self) -> bool {
-        self.faults.iter().any(|fault| fault == Fault::Mirrored)
+        self.has(Defect::Mirrored)
     }
 
     /// Whether the depth map alone is mirrored left for right.
     pub fn is_depth_mirrored(&self) -> bool {
-        self.faults.iter().any(|fault| fault == Fault::DepthMirrored)
+        self.has(Defect::DepthMirrored)
     }
 
     /// The shape of the print.
     pub(super) fn surface(&self) -> Surface {
-        let of = |fault: Fault| match fault {
-            Fault::Bent { peak_to_valley_m } => Some(Surface::taped_sheet(peak_to_valley_m)),
-            _ => None,
-        };
-        self.faults.iter().find_map(of).unwrap_or(Surface::FLAT)
+        match self.faults.bent_m {
+            0.0 => Surface::FLAT,
+            bent_m => Surface::taped_sheet(bent_m),
+        }
     }
 
     pub(super) fn sensor_with_faults(&self) -> DepthSensor {
         let mut sensor = self.sensor;
-        for fault in self.faults.iter() {
-            match fault {
-                Fault::DepthScale { excess } => sensor.scale_excess += excess,
-                Fault::DepthBias { bias_m } => sensor.bias_m += bias_m,
-                Fault::DepthZoom { zoom } => sensor.zoom *= zoom,
-                Fault::DepthShift { shift_px: [x, y] } => {
+        for defect in self.faults.defects() {
+            match defect {
+                Defect::DepthScale { ratio } => sensor.scale *= ratio,
+                Defect::DepthBias { bias_m } => sensor.bias_m += bias_m,
+                Defect::DepthZoom { zoom: [x, y] } => {
+                    sensor.zoom[0] *= x;
+                    sensor.zoom[1] *= y;
+                }
+                Defect::DepthShift { shift_px: [x, y] } => {
                     sensor.shift_px[0] += x;
                     sensor.shift_px[1] += y;
                 }

@@ -43,11 +43,11 @@ pub struct DepthSensor {
     /// Depths are whole multiples of this, metres; 0 for none.
     pub unit_m: f64,
     /// Error: measured over true, minus 1.
-    pub scale_excess: f64,
+    pub scale: f64,
     /// Error: measured minus true, metres.
     pub bias_m: f64,
     /// Error: the depth map shows a window of the image this wide and high (1 = all of it) about the principal point.
-    pub zoom: f64,
+    pub zoom: [f64; 2],
     /// Error: the depth map's content lies this far right of and below its place, pixels.
     pub shift_px: [f64; 2],
 }
@@ -68,9 +68,9 @@ impl DepthSensor {
         contrast_blur_px: 1.0,
         border_px: [0; 4],
         unit_m: 0.0,
-        scale_excess: 0.0,
+        scale: 1.0,
         bias_m: 0.0,
-        zoom: 1.0,
+        zoom: [1.0; 2],
         shift_px: [0.0; 2],
     };
 
@@ -127,9 +127,12 @@ pub(super) fn measure_frame(
         }
         // The place in the colour image that this depth pixel looks at.
         let [dx, dy] = sensor.shift_px;
-        let window = |p: f64, shift: f64, c: f64| c + sensor.zoom * (p - shift - c);
-        let at =
-            Pixel::new(window(x as f64, dx, intrinsics.cx), window(y as f64, dy, intrinsics.cy));
+        let [zx, zy] = sensor.zoom;
+        let window = |p: f64, zoom: f64, shift: f64, c: f64| c + zoom * (p - shift - c);
+        let at = Pixel::new(
+            window(x as f64, zx, dx, intrinsics.cx),
+            window(y as f64, zy, dy, intrinsics.cy),
+        );
         sight.seen(at)
     };
     let seen: Vec<Option<Seen>> =
@@ -157,10 +160,8 @@ pub(super) fn measure_frame(
         }
         let noise_m = sensor.noise_m(seen.depth_m) * noise.at(x, y);
         let dark = darkness.as_ref().map_or(0.0, |d| f64::from(d[y * width + x]));
-        let measured = seen.depth_m * (1.0 + sensor.scale_excess)
-            + sensor.bias_m
-            + sensor.contrast_m * dark
-            + noise_m;
+        let measured =
+            seen.depth_m * sensor.scale + sensor.bias_m + sensor.contrast_m * dark + noise_m;
         let unit = sensor.unit_m;
         let stored = if unit > 0.0 { (measured / unit).round() * unit } else { measured };
         (stored > 0.0).then_some(stored)

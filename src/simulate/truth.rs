@@ -69,15 +69,15 @@ pub struct TrueTable {
     pub magnification: Vec<f64>,
 }
 
-/// A depth sensor: sensor depth = true depth·(1 + scale excess) + bias + noise.
+/// A depth sensor: sensor depth = scale · true depth + bias + noise.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrueDepth {
-    /// Measured over true, minus 1.
-    pub scale_excess: f64,
+    /// Measured over true.
+    pub scale: f64,
     /// Measured minus true, metres.
     pub bias_m: f64,
     /// Depth pixel p holds what the colour image has at c + zoom·(p − shift − c), c the true principal point.
-    pub zoom: f64,
+    pub zoom: [f64; 2],
     /// As above, pixels.
     pub shift_px: [f64; 2],
     /// The depth map alone is mirrored left for right.
@@ -137,7 +137,7 @@ impl Truth {
             schema: SCHEMA.to_owned(),
             seed: plan.seed,
             device: plan.device.name.to_owned(),
-            faults: plan.faults.iter().map(|fault| fault.to_string()).collect(),
+            faults: plan.faults.texts(),
             board: plan.board_text(),
             surface_coefficients_m: plan.surface().coefficients_m.to_vec(),
             camera: TrueCamera {
@@ -152,7 +152,7 @@ impl Truth {
             factory_center_px: [factory.cx, factory.cy],
             mirrored: plan.is_mirrored(),
             depth: TrueDepth {
-                scale_excess: sensor.scale_excess,
+                scale: sensor.scale,
                 bias_m: sensor.bias_m,
                 zoom: sensor.zoom,
                 shift_px: sensor.shift_px,

@@ -5,10 +5,9 @@ use std::sync::Arc;
 use truedepth::{
     audit::{Audit, Method, Options, audit},
     camera::{Camera, Distortion},
-    correct::{Mirrored, Plan, Sampling, Step, Which, correct},
+    correct::{Plan, Sampling, Selection, correct},
     diagnose::{Code, Verdict},
-    recording::{Limits, Memory, Recording},
-    report::wire,
+    recording::{Defect, Limits, Memory, Recording},
     simulate::{Device, Faults, Plan as Simulation},
 };
 
@@ -76,9 +75,7 @@ fn simulated_faults_go() {
         let (simulation, recording) = simulated(group);
         let before = run(&recording);
         assert!(faults(&before).len() >= group.len(), "{group:?}: {:?}", faults(&before));
-        let plan = wire::Audit::from(&before)
-            .plan(Which::Faults, Sampling::EdgeAware)
-            .expect("a way back");
+        let plan = Plan::of_audit(&before, Selection::Faults).expect("a way back");
         let fixed = applied(&recording, &plan);
         let after = run(&fixed);
         assert_eq!(faults(&after), [], "{group:?}");
@@ -95,9 +92,7 @@ fn simulated_faults_go() {
 #[test]
 fn told_faults_go() {
     let (simulation, recording) = simulated(&["center=4px,-2px", "depth-bias=2mm"]);
-    let said = recording.factory().expect("has metadata").intrinsics;
-    let plan =
-        Plan::from_faults(simulation.faults.iter(), &said, Sampling::EdgeAware).expect("a plan");
+    let plan = Plan::given(simulation.faults.defects()).expect("a plan");
     let fixed = applied(&recording, &plan);
     let (before, after) = (run(&recording), run(&fixed));
     let was = cloud_error(&simulation, &recording, &before);
@@ -112,14 +107,13 @@ fn what_is_significant_goes_when_asked() {
     let before = run(&recording);
     assert_eq!(faults(&before), []);
     let was = cloud_error(&simulation, &recording, &before);
-    let audit = wire::Audit::from(&before);
-    assert!(audit.plan(Which::Faults, Sampling::EdgeAware).expect("a plan").is_empty());
-    for which in [Which::Significant, Which::Only(&["depth"])] {
-        let plan = audit.plan(which, Sampling::EdgeAware).expect("a plan");
+    assert!(Plan::of_audit(&before, Selection::Faults).expect("a plan").is_empty());
+    for selection in [Selection::Significant, Selection::Only(&["depth"])] {
+        let plan = Plan::of_audit(&before, selection).expect("a plan");
         let fixed = applied(&recording, &plan);
         let after = run(&fixed);
         let is = cloud_error(&simulation, &fixed, &after);
-        assert!(was > 0.003 && is < 0.001, "{which:?}: {was} before, {is} after");
+        assert!(was > 0.003 && is < 0.001, "{selection:?}: {was} before, {is} after");
     }
 }
 
@@ -130,14 +124,12 @@ fn zoomed_depth_of_the_real_ipad_is_found_and_goes() {
     let real = Recording::open(&path, &Limits::default()).expect("opens");
     let zoomed = applied(
         &real,
-        &Plan::new(vec![Step::DepthZoom { zoom: [1.0 / 0.9507; 2] }], Sampling::EdgeAware)
-            .expect("a plan"),
+        &Plan::given(&[Defect::DepthZoom { zoom: [1.0 / 0.9507; 2] }]).expect("a plan"),
     );
     let before = run(&zoomed);
     assert!(faults(&before).contains(&Code::TD401), "{:?}", faults(&before));
     let found = before.registration.as_ref().expect("depth on the board").zoom;
-    let plan =
-        wire::Audit::from(&before).plan(Which::Faults, Sampling::EdgeAware).expect("a way back");
+    let plan = Plan::of_audit(&before, Selection::Faults).expect("a way back");
     let fixed = applied(&zoomed, &plan);
     let after = run(&fixed);
     assert_eq!(faults(&after), []);
@@ -164,8 +156,8 @@ fn focal_length_of_the_real_ipad() {
         .camera
         .expect("calibrates");
     let recording = Recording::open(&still, &Limits::default()).expect("opens");
-    let fixed =
-        applied(&recording, &Plan::from_camera(&camera, Sampling::EdgeAware).expect("a plan"));
+    let said = recording.factory().expect("has metadata").intrinsics;
+    let fixed = applied(&recording, &Plan::of_camera(&camera, &said).expect("a plan"));
     let error_mm = |recording: &Recording| {
         1e3 * run(recording).factory_depth.expect("depth").mean_of_medians_m.expect("frames").value
     };
@@ -182,7 +174,7 @@ fn focal_length_of_the_real_ipad() {
 #[test]
 fn mirroring_twice_is_nothing_and_a_wrong_camera_is_refused() {
     let (_, recording) = simulated(&["focal=1%"]);
-    let unmirror = Plan::new(vec![Step::Unmirror(Mirrored::Both)], Sampling::Nearest).unwrap();
+    let unmirror = Plan::given(&[Defect::Mirrored]).unwrap().sampled(Sampling::Nearest);
     let twice = applied(&applied(&recording, &unmirror), &unmirror);
     assert_eq!(twice.rgb(3).unwrap(), recording.rgb(3).unwrap());
     let same = |a: &Recording, b: &Recording| {
@@ -192,11 +184,11 @@ fn mirroring_twice_is_nothing_and_a_wrong_camera_is_refused() {
     assert!(same(&twice, &recording));
     assert!(!same(&applied(&recording, &unmirror), &recording));
 
-    let mut intrinsics = recording.factory().unwrap().intrinsics;
-    intrinsics.width = 320;
+    let said = recording.factory().unwrap().intrinsics;
+    let intrinsics = truedepth::camera::Intrinsics { width: 320, ..said };
     let lens = truedepth::camera::Brown { k1: 0.1, k2: 0.0, p1: 0.0, p2: 0.0, k3: 0.0 };
     let camera = Camera { intrinsics, distortion: Distortion::Brown(lens) };
-    let plan = Plan::from_camera(&camera, Sampling::EdgeAware).unwrap();
+    let plan = Plan::of_camera(&camera, &said).unwrap();
     let mut sink = Memory::new("never");
     let error = correct(&recording, &plan, &mut sink).unwrap_err();
     assert!(error.to_string().contains("320x480") && sink.files().is_empty(), "{error}");

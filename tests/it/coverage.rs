@@ -6,7 +6,8 @@ use truedepth::{
     depth::{patches, temporal_noise},
     diagnose::{Code, Verdict},
     image::DepthMap,
-    simulate::{Device, Faults, Plan, Stream},
+    recording::StreamState,
+    simulate::{Device, Faults, Plan},
 };
 
 fn judged(device: &str, seed: u64, faults: &[&str]) -> (Plan, Audit) {
@@ -56,7 +57,7 @@ fn sigmas_and_verdicts_of_sound_recordings() {
         let device = ["ipad-12.9-5gen", "ipad-12.9-4gen", "iphone-13"][i % 3];
         let wavy: &[&str] = if i % 2 == 1 { &["bent=0.8mm"] } else { &[] };
         let (plan, audit) = judged(device, 50 + i as u64, wavy);
-        let distorted = plan.stream() == Stream::Distorted;
+        let distorted = plan.stream() == StreamState::Distorted;
         let expected = if distorted { vec![Code::TD203] } else { Vec::new() };
         assert_eq!(faults(&audit), expected, "{device} {i}");
         let focal = audit.calibration.as_ref().expect("calibrates").focal_px();

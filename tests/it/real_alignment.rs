@@ -5,10 +5,10 @@ use std::sync::Arc;
 use truedepth::{
     audit::{Audit, Method, Options, audit},
     depth::Registration,
-    diagnose::{Code, DistortionState, Verdict},
+    diagnose::{Code, Verdict, depth_state},
     geom::Pixel,
     image::DepthMap,
-    recording::{Limits, Memory, Recording, encode_depth},
+    recording::{Limits, Memory, Recording, StreamState, encode_depth},
 };
 
 use crate::data;
@@ -161,14 +161,14 @@ fn distorted_depth_beside_rectified_colour_is_told() {
     for (audit, whole) in [(&before, 0.0), (&after, 1.0)] {
         let share = registration(audit).lens_share.expect("there are tables");
         assert!((share.value - whole).abs() < 2.0 * share.sigma && share.sigma < 0.25, "{share:?}");
-        assert_eq!(audit.distortion_state, DistortionState::Rectified);
-        let told = DistortionState::Rectified.of_depth(Some(share));
+        assert_eq!(audit.distortion_state, StreamState::Rectified);
+        let told = depth_state(StreamState::Rectified, Some(share));
         assert_eq!(audit.depth_distortion_state, told, "{share:?}");
         let finding = audit.findings.iter().find(|f| f.code == Code::TD203).expect("is checked");
         let warned = finding.verdict == Verdict::Warning;
-        assert_eq!(warned, told == DistortionState::Distorted, "{finding:?}");
+        assert_eq!(warned, told == StreamState::Distorted, "{finding:?}");
     }
-    assert_eq!(before.depth_distortion_state, DistortionState::Rectified);
+    assert_eq!(before.depth_distortion_state, StreamState::Rectified);
     // 0.77 ± 0.17: most of the way, and not beyond doubt.
-    assert_ne!(after.depth_distortion_state, DistortionState::Rectified);
+    assert_ne!(after.depth_distortion_state, StreamState::Rectified);
 }

@@ -2,8 +2,8 @@
 
 use truedepth::{
     audit::{Audit, Method, Options, audit},
-    diagnose::{Code, DistortionState, Finding, Sensor, Verdict},
-    recording::{Limits, Recording},
+    diagnose::{Code, Finding, Sensor, Verdict},
+    recording::{Limits, Recording, StreamState},
 };
 
 use crate::data;
@@ -56,7 +56,7 @@ fn depth_with_factory_intrinsics() {
             assert_eq!(finding.verdict, Verdict::Unknown, "{finding:?}");
             assert!(finding.what_to_do.contains("Record"), "{finding:?}");
         }
-        assert_eq!(audit.distortion_state, DistortionState::Unknown);
+        assert_eq!(audit.distortion_state, StreamState::Unknown);
     }
 }
 
@@ -67,7 +67,7 @@ fn ipad_5th_generation_has_a_wrong_focal_length() {
     let focal = finding(&audit, Code::TD201);
     let (value, sigma) = (focal.value.expect("value"), focal.sigma.expect("sigma"));
     assert!((value + 6.1).abs() < 0.3 && sigma < 0.2, "{focal:?}");
-    assert_eq!(audit.distortion_state, DistortionState::Rectified);
+    assert_eq!(audit.distortion_state, StreamState::Rectified);
     // With its own focal length the sensor is right: the paper's 14 mm were the focal length's.
     let factory_m = audit.factory_depth.and_then(|d| d.mean_of_medians_m).expect("depth").value;
     let own_m = audit.own_depth.and_then(|d| d.mean_of_medians_m).expect("depth").value;
@@ -79,7 +79,7 @@ fn ipad_4th_generation_is_not_rectified() {
     for method in [Method::Auto, Method::Paper] {
         let Some(audit) = run(IPAD4, method) else { return };
         assert_eq!(faults(&audit), [Code::TD203], "{}", audit.method.name());
-        assert_eq!(audit.distortion_state, DistortionState::Distorted);
+        assert_eq!(audit.distortion_state, StreamState::Distorted);
         let number = |name: &str| {
             let evidence = &finding(&audit, Code::TD203).evidence;
             evidence.iter().find(|e| e.name == name).expect("named evidence").value

@@ -45,7 +45,7 @@ fn numbers_of_the_published_recordings() {
     let states: Vec<&str> =
         paper.lens.iter().map(|lens| lens.straightness.state().name()).collect();
     assert_eq!(states.iter().filter(|state| **state == "distorted").count(), 2, "{states:?}");
-    assert_eq!(states.iter().filter(|state| **state == "straight").count(), 1, "{states:?}");
+    assert_eq!(states.iter().filter(|state| **state == "rectified").count(), 1, "{states:?}");
 
     let pictures = PaperPictures::read(&paper).expect("draws");
     let page = paper_page(&paper, &pictures);

@@ -29,7 +29,11 @@ const FORBIDDEN: &[(&str, &[&str], &str)] = &[
     ("std::fs", &["recording"], "only `recording` opens files"),
     ("File::", &["recording"], "only `recording` opens files"),
     ("super::super", &[], "say `crate::room::...`, so that the order of rooms can be checked"),
-    ("Serialize", &["report"], "only `report::wire` is serialised outward"),
+    (
+        "Serialize",
+        &["report", "recording", "correct"],
+        "only `report::wire` and defects are serialised outward",
+    ),
     ("HashMap", &[], "hash order must never reach a result; use BTreeMap"),
     ("HashSet", &[], "hash order must never reach a result; use BTreeSet"),
 ];

@@ -3,10 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{ValueEnum, builder::PossibleValuesParser};
-use truedepth::{
-    correct::Step,
-    simulate::{Fault, FaultError},
-};
+use truedepth::recording::Defect;
 
 use super::{InputArgs, JsonArgs, paper::DevicesArgs};
 
@@ -26,7 +23,7 @@ pub(crate) struct CorrectArgs {
     /// Take only these steps, also where what was found is within the tolerance
     ///
     /// Of an audit or a report: what is significant, if not a fault, is corrected by the step that names it.
-    #[arg(long, value_name = "STEP", value_delimiter = ',', value_parser = PossibleValuesParser::new(Step::NAMES))]
+    #[arg(long, value_name = "STEP", value_delimiter = ',', value_parser = PossibleValuesParser::new(Defect::STEPS))]
     pub(crate) only: Vec<String>,
 
     /// Correct all that is significant, not faults alone
@@ -69,8 +66,8 @@ pub(crate) struct WhatArgs {
     ///
     /// One of focal=6.6% (the metadata's is so much too long), center=4px,-2px, distorted, rectified-twice,
     /// depth-scale=1.5%, depth-bias=2mm, depth-zoom=0.9507, depth-shift=3px,0px, mirrored, depth-mirrored.
-    #[arg(long = "fault", value_name = "FAULT", value_parser = fault)]
-    pub(crate) faults: Vec<Fault>,
+    #[arg(long = "fault", value_name = "FAULT")]
+    pub(crate) faults: Vec<Defect>,
 
     /// REC is AVFoundation's; correct it by the paper's equations with ARKit's metadata of the device
     ///
@@ -103,7 +100,7 @@ impl WhatArgs {
 pub(crate) enum Steps<'a> {
     Audit,
     With(&'a std::path::Path),
-    Faults(&'a [Fault]),
+    Faults(&'a [Defect]),
     /// The recording is the side that is not given.
     Pair {
         av: Option<&'a str>,
@@ -117,10 +114,6 @@ pub(crate) enum SamplingChoice {
     EdgeAware,
     /// The nearest measurement
     Nearest,
-}
-
-fn fault(text: &str) -> Result<Fault, FaultError> {
-    text.parse()
 }
 
 pub(crate) const CORRECT_EXAMPLES: &str = "\

@@ -7,8 +7,8 @@ use std::{
 
 use truedepth::{
     audit::{Method, Options},
-    correct::{Because, Plan, Progress, Sampling, Step, Which, correct_observed},
-    diagnose::{self, Api, KnownIssue},
+    correct::{Plan, Progress, Reason, Sampling, Selection, Step, correct_observed},
+    diagnose::{self, Api},
     recording::{Recording, Sink, WholeFolder},
     report::{self, wire},
 };
@@ -34,19 +34,19 @@ pub(crate) fn run(args: &CorrectArgs, terminal: &Terminal) -> Result<Outcome, Fa
     let asked = Asked {
         path: &args.recording,
         steps: args.what.chosen(),
-        which: match (&only[..], args.within_tolerance) {
-            ([], false) => Which::Faults,
-            ([], true) => Which::Significant,
-            (names, _) => Which::Only(names),
-        },
-        sampling: match args.sampling {
-            SamplingChoice::EdgeAware => Sampling::EdgeAware,
-            SamplingChoice::Nearest => Sampling::Nearest,
+        selection: match (&only[..], args.within_tolerance) {
+            ([], false) => Selection::Faults,
+            ([], true) => Selection::Significant,
+            (names, _) => Selection::Only(names),
         },
         devices: &args.devices,
         input: &args.input,
     };
     let (plan, findings) = plan(&asked, &recording, terminal)?;
+    let plan = plan.sampled(match args.sampling {
+        SamplingChoice::EdgeAware => Sampling::EdgeAware,
+        SamplingChoice::Nearest => Sampling::Nearest,
+    });
     if plan.is_empty() && !args.always {
         terminal.say(&format!("{}: nothing to correct; nothing was written", recording.name));
         return Ok(Outcome::Clean);
@@ -75,8 +75,7 @@ pub(super) struct Asked<'a> {
     /// Of this recording.
     pub(super) path: &'a Path,
     pub(super) steps: Steps<'a>,
-    pub(super) which: Which<'a>,
-    pub(super) sampling: Sampling,
+    pub(super) selection: Selection<'a>,
     pub(super) devices: &'a DevicesArgs,
     pub(super) input: &'a InputArgs,
 }
@@ -87,59 +86,64 @@ pub(super) fn plan(
     recording: &Recording,
     terminal: &Terminal,
 ) -> Result<(Plan, Vec<wire::FindingInfo>), Failure> {
-    let sampling = asked.sampling;
-    let by_audit = |audit: &wire::Audit| -> Result<_, Failure> {
-        let plan = audit.plan(asked.which, sampling)?;
-        let taken = |finding: &&wire::FindingInfo| {
-            plan.steps().iter().any(|(_, because)| because.name() == finding.code)
-        };
-        for finding in audit.findings.iter().filter(taken) {
-            terminal.detail(&format!("{}: {}", finding.code, finding.summary));
-        }
-        let left = audit.findings.iter().filter(|f| f.correction.is_some() && !taken(f));
-        if asked.which == Which::Faults {
-            for finding in left {
-                terminal.say(&format!(
-                    "left alone, within the tolerance: {}: {} (--within-tolerance corrects it)",
-                    finding.code, finding.summary
-                ));
-            }
-        }
-        let findings = audit.findings.iter().filter(taken).cloned().collect();
-        Ok((plan, findings))
+    let said = || {
+        let none = || Failure::new(format!("{} has no factory metadata", recording.place()));
+        recording.factory().map(|f| f.intrinsics).ok_or_else(none)
     };
-    let only = |plan: Plan| match asked.which {
-        Which::Only(names) => plan.only(names),
-        _ => plan,
-    };
-    match asked.steps {
+    let plan = match asked.steps {
         Steps::Audit => {
             let mut options = Options::new(Method::Auto);
             options.board = input::board(&asked.input.board)?;
-            by_audit(&wire::Audit::from(&observed(recording, &options, terminal)?))
+            let audit = observed(recording, &options, terminal)?;
+            let plan = Plan::of_audit(&audit, asked.selection)?;
+            let findings = taken(asked, &plan, wire::Audit::from(&audit).findings, terminal);
+            return Ok((plan, findings));
         }
         Steps::With(path) => match input::document(path)? {
-            wire::Document::Audit(audit) => by_audit(&audit),
-            _ => Ok((only(Plan::from_camera(&input::camera(path)?, sampling)?), Vec::new())),
+            wire::Document::Audit(audit) => {
+                let plan = audit.plan(asked.selection)?;
+                let findings = taken(asked, &plan, audit.findings, terminal);
+                return Ok((plan, findings));
+            }
+            _ => Plan::of_camera(&input::camera(path)?, &said()?)?,
         },
-        Steps::Faults(faults) => {
-            let said = recording.factory().map(|f| f.intrinsics).ok_or_else(|| {
-                Failure::new(format!("{} has no factory metadata", recording.place()))
-            })?;
-            let plan = Plan::from_faults(faults.iter().copied(), &said, sampling)?;
-            Ok((only(plan), Vec::new()))
-        }
-        Steps::Pair { av, ar } => Ok((only(by_equations(asked, recording, av, ar)?), Vec::new())),
+        Steps::Faults(defects) => Plan::given(defects)?,
+        Steps::Pair { av, ar } => by_equations(asked, av, ar)?,
+    };
+    let plan = match asked.selection {
+        Selection::Only(names) => plan.only(names),
+        _ => plan,
+    };
+    Ok((plan, Vec::new()))
+}
+
+/// The findings that the plan follows; those that it leaves alone are said.
+fn taken(
+    asked: &Asked<'_>,
+    plan: &Plan,
+    findings: Vec<wire::FindingInfo>,
+    terminal: &Terminal,
+) -> Vec<wire::FindingInfo> {
+    let (taken, left): (Vec<_>, Vec<_>) = findings
+        .into_iter()
+        .filter(|finding| finding.defect.is_some())
+        .partition(|f| plan.steps().iter().any(|step| step.reason.name() == f.code));
+    for finding in &taken {
+        terminal.detail(&format!("{}: {}", finding.code, finding.summary));
     }
+    if asked.selection == Selection::Faults {
+        for finding in left {
+            terminal.say(&format!(
+                "left alone, within the tolerance: {}: {} (--within-tolerance corrects it)",
+                finding.code, finding.summary
+            ));
+        }
+    }
+    taken
 }
 
 /// The paper's equations from both APIs' metadata.
-fn by_equations(
-    asked: &Asked<'_>,
-    recording: &Recording,
-    av: Option<&str>,
-    ar: Option<&str>,
-) -> Result<Plan, Failure> {
+fn by_equations(asked: &Asked<'_>, av: Option<&str>, ar: Option<&str>) -> Result<Plan, Failure> {
     let registry = input::registry(asked.devices.devices.as_deref())?;
     let shown = asked.path.display().to_string();
     let side = |text: Option<&str>, api: Api| -> Result<diagnose::Side, Failure> {
@@ -148,21 +152,10 @@ fn by_equations(
     };
     let pair = diagnose::compare(side(av, Api::AvFoundation)?, side(ar, Api::ArKit)?);
     let across = pair.across.ok_or_else(|| Failure::new("both sides are of one API"))?;
-    let width = recording.factory().map_or(640, |f| f.intrinsics.width) as f64;
-    let is_ar = av.is_some();
-    let step = match across.issue {
-        Some(KnownIssue::DepthZoom) if is_ar => Some(Step::DepthZoom { zoom: across.depth_zoom }),
-        Some(KnownIssue::FocalLength) => {
-            let (px, sheet) = match is_ar {
-                true => (across.ar_corrected_px, &pair.second.sheet),
-                false => (across.av_corrected_px, &pair.first.sheet),
-            };
-            Some(Step::Focal { focal_px: px * width / sheet.reference[0] })
-        }
-        _ => None,
-    };
-    let steps = step.into_iter().map(|step| (step, Because::Equations)).collect();
-    Ok(Plan::because(steps, asked.sampling)?)
+    // The recording is the side that is not given.
+    let defect = across.defect(if av.is_some() { Api::ArKit } else { Api::AvFoundation });
+    let step = |defect| Step { defect, reason: Reason::Equations };
+    Ok(Plan::new(defect.into_iter().map(step).collect(), None)?)
 }
 
 /// The output must not lie in the input, nor the other way round.
@@ -190,16 +183,8 @@ fn resolved(path: &Path) -> Option<PathBuf> {
 /// What was done.
 fn words(document: &wire::Correct, output: &Path) -> String {
     let mut text = format!("{}: {} frames\n", output.display(), document.n_frames);
-    for step in &document.steps {
-        let mut parameters: Vec<String> =
-            step.parameters.iter().map(|(name, value)| format!("{name} {value:.6}")).collect();
-        parameters.extend(step.how.clone());
-        text.push_str(&format!(
-            "  {:<17} {}   ({})\n",
-            step.step,
-            parameters.join(", "),
-            step.because
-        ));
+    for Step { defect, reason } in &document.steps {
+        text.push_str(&format!("  {:<17} {defect:.6}   ({})\n", defect.step(), reason.name()));
     }
     if let (Some(before), Some(after)) = (&document.factory_before, &document.factory_after)
         && before != after

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use truedepth::{
     audit::{Method, Options},
-    recording::{Limits, Memory, Recording},
+    recording::{Defect, Limits, Memory, Recording},
     report::{self, Tone, Typed, wire},
-    simulate::{Device, Fault, Faults, Plan, Truth},
+    simulate::{Device, Faults, Plan, Truth},
 };
 
 use super::audit::{observed, page, show};
@@ -22,7 +22,7 @@ use crate::{
 const DEVICE: &str = "ipad-12.9-5gen";
 /// What the recording is called in the commands that are shown.
 const RECORDING: &str = "ipad";
-const FAULTS: [Fault; 2] = [Fault::Focal { excess: 0.066 }, Fault::DepthScale { excess: 0.015 }];
+const FAULTS: [Defect; 2] = [Defect::Focal { ratio: 1.066 }, Defect::DepthScale { ratio: 1.015 }];
 
 pub(crate) fn run(args: &DemoArgs, terminal: &Terminal) -> Result<Outcome, Failure> {
     let folder = ReportFolder::new(&args.output)?;
@@ -98,7 +98,7 @@ fn beside(truth: &Truth, found: &wire::Audit, terminal: &Terminal) -> String {
         ),
         (
             "depth scale",
-            format!("{:.4}", 1.0 + truth.depth.scale_excess),
+            format!("{:.4}", truth.depth.scale),
             estimate(depth.and_then(|d| d.scale), depth.and_then(|d| d.scale_sigma), 4),
         ),
         ("stream", truth.camera.stream.clone(), found.distortion_state.clone()),

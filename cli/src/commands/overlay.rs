@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use truedepth::{
-    correct::{Plan, Sampling, Which},
+    correct::{Plan, Selection},
     recording::{Recording, WholeFolder},
     report::{self, After, Animation, DepthPictures, DepthStyle, Drawn, Flip, Range, Shown, wire},
 };
@@ -86,8 +86,7 @@ impl Beside {
         let asked = Asked {
             path: &args.recording,
             steps: chosen,
-            which: Which::Faults,
-            sampling: Sampling::EdgeAware,
+            selection: Selection::Faults,
             devices: &args.devices,
             input: &args.input,
         };

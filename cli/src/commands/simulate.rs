@@ -16,7 +16,7 @@ use crate::{
 pub(crate) fn run(args: &SimulateArgs, terminal: &Terminal) -> Result<Outcome, Failure> {
     let device: Device = Device::named(&args.device)?;
     let mut plan = Plan::new(device, args.seed);
-    plan.faults = Faults::new(args.faults.iter().copied().flatten())?;
+    plan.faults = Faults::parse(args.faults.iter().map(String::as_str))?;
     plan.trajectory = match args.trajectory {
         args::Trajectory::HandHeld => truedepth::simulate::Trajectory::HandHeld,
         args::Trajectory::FrontoParallel => truedepth::simulate::Trajectory::FrontoParallel,

@@ -93,7 +93,7 @@ fn within_the_tolerance_only_when_asked() {
     assert!(!out.exists());
     correct(&["--only", "depth", "--within-tolerance"]).code(2);
     let run = correct(&["--within-tolerance"]).code(0);
-    assert!(run.stdout.contains("bias_mm") && run.stdout.contains("TD302"), "{}", run.stdout);
+    assert!(run.stdout.contains("depth-bias=") && run.stdout.contains("TD302"), "{}", run.stdout);
 }
 
 #[test]

@@ -53,7 +53,7 @@ fn depth_over_colour() {
         let run = truedepth(args("overlay", recording.as_os_str(), out.as_os_str(), &more)).code(0);
         let value: serde_json::Value = serde_json::from_str(&run.stdout).unwrap();
         assert_eq!(value["schema"], "truedepth.overlay/1");
-        assert_eq!(value["steps"][0]["step"], "zoom");
+        assert_eq!(value["steps"][0]["defect"]["kind"], "depth-zoom");
         assert_eq!(value["frames"][0]["timestamp"], 1500);
         let holes = &value["frames"][0]["holes_percent"];
         assert_eq!(holes[0], 0.0);
@@ -125,7 +125,7 @@ fn a_frame_without_depth_is_left_out_and_said() {
 fn the_lens_side_by_side() {
     let scratch = Scratch::new();
     for (fault, state, words) in
-        [("distorted", "distorted", "Not rectified"), ("focal=1%", "straight", "Already straight")]
+        [("distorted", "distorted", "Not rectified"), ("focal=1%", "rectified", "Already straight")]
     {
         let (rec, out) = (scratch.join(state), scratch.join(&format!("{state}-out")));
         truedepth([

@@ -7,7 +7,7 @@ use crate::{
     audit::{Audit, FrameAudit},
     calibrate::Estimate,
     camera::{Camera, Distortion},
-    correct::{Mirrored, Plan, Sampling, Which},
+    correct::{Plan, Selection},
     depth::{BoardDepth, MAX_ERROR_M},
     geom::{Board, Color, Pixel, Pose},
     pose::View,
@@ -97,19 +97,16 @@ impl Corrected {
 
     /// What `truedepth correct` would do; nothing where it would find no way.
     fn of(audit: &Audit, center_px: [f64; 2]) -> Self {
-        let (state, camera) = (audit.distortion_state, audit.camera.as_ref());
-        let plan =
-            Plan::from_findings(&audit.findings, state, camera, Which::Faults, Sampling::EdgeAware);
-        let Ok(plan) = plan else { return Self::NOTHING };
+        let Ok(plan) = Plan::of_audit(audit, Selection::Faults) else { return Self::NOTHING };
         let ([zoom, _], shift_px) = (plan.zoom(), plan.shift_px());
-        let mirrored = plan.unmirror() == Some(Mirrored::Depth);
+        let mirrored = plan.mirrors_depth() && !plan.mirrors_color();
         let moves = mirrored || zoom != 1.0 || shift_px != [0.0; 2];
-        let (scale, bias_m) = plan.line();
+        let (scale, bias_m) = plan.depth_scale_and_bias();
         Self {
             scale,
             bias_m,
             moved: moves.then_some(Moved { mirrored, zoom, shift_px, center_px }),
-            mirrored: plan.unmirror() == Some(Mirrored::Both),
+            mirrored: plan.mirrors_color(),
         }
     }
 

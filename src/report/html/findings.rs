@@ -4,7 +4,8 @@ use maud::{Markup, html};
 
 use crate::{
     audit::Audit,
-    diagnose::{Correction, Evidence, Finding, Verdict},
+    diagnose::{Evidence, Finding, Verdict},
+    recording::Defect,
     report::{
         figures,
         next::{Typed, explain_command, next_steps},
@@ -110,10 +111,10 @@ fn full(audit: &Audit, finding: &Finding) -> Markup {
                 @if !finding.what_to_do.is_empty() {
                     p class="to-do" { strong { "What to do. " } (prose(&finding.what_to_do)) }
                 }
-                @if let Some(correction) = &finding.correction {
+                @if let Some(defect) = &finding.defect {
                     p class="correction" {
                         strong { "The correction. " }
-                        (words::unbroken(&correction_words(correction)))
+                        (words::unbroken(&correction_words(defect)))
                     }
                 }
                 (evidence(audit, finding))
@@ -202,10 +203,10 @@ fn list(audit: &Audit, findings: &[&Finding]) -> Markup {
                                     @if !finding.what_to_do.is_empty() { " " (prose(&finding.what_to_do)) }
                                 }
                             }
-                            @if let Some(correction) = &finding.correction {
+                            @if let Some(defect) = &finding.defect {
                                 p class="correction" {
                                     strong { "The correction. " }
-                                    (words::unbroken(&correction_words(correction)))
+                                    (words::unbroken(&correction_words(defect)))
                                     " Made only with " code { "--within-tolerance" } "."
                                 }
                             }
@@ -255,54 +256,49 @@ fn evidence_table(finding: &Finding) -> Markup {
     table.to_html("The numbers behind it")
 }
 
-/// What a correction does, in a sentence.
-fn correction_words(correction: &Correction) -> String {
-    let what = match correction {
-        Correction::Focal { focal_px } => {
-            format!(
-                "Use a focal length of {} px at the size of these images.",
-                words::plain(*focal_px, 2)
-            )
+/// What removes a defect, in a sentence.
+fn correction_words(defect: &Defect) -> String {
+    let what = match *defect {
+        Defect::Focal { ratio } => {
+            format!("Divide the focal length of the metadata by {}.", words::plain(ratio, 5))
         }
-        Correction::PrincipalPoint { center_px: [x, y] } => format!(
-            "Use the principal point ({}, {}) px at the size of these images.",
-            words::plain(*x, 2),
-            words::plain(*y, 2)
+        Defect::Center { shift_px: [x, y] } => format!(
+            "Move the principal point of the metadata by ({}, {}) px.",
+            words::signed(-x, 2),
+            words::signed(-y, 2)
         ),
-        Correction::Undistort { tables: Some(_) } => {
-            "Resample the images to straight lines with the tables of this recording.".to_owned()
-        }
-        Correction::Undistort { tables: None } => {
-            "Resample the images to straight lines with the own camera model.".to_owned()
-        }
-        Correction::Depth { scale, bias_m } if bias_m.abs() < 5e-6 => {
-            format!("Divide every depth by {}.", words::plain(*scale, 5))
-        }
-        Correction::Depth { scale, bias_m } => format!(
-            "Take {} mm from every depth, then divide it by {}.",
-            words::plain(1e3 * bias_m, 2),
-            words::plain(*scale, 5)
-        ),
-        Correction::Align { zoom, shift_px: [0.0, 0.0] } => {
-            format!(
-                "Resample depth to colour: zoom {} about the principal point.",
-                words::plain(*zoom, 4)
-            )
-        }
-        Correction::Align { shift_px: [x, y], .. } => format!(
-            "Resample depth to colour: it lies {} px too far right and {} px too far down.",
-            words::plain(*x, 2),
-            words::plain(*y, 2)
-        ),
-        Correction::Unmirror => "Mirror the images back.".to_owned(),
-        Correction::UnmirrorDepth => "Mirror the depth maps back.".to_owned(),
-        Correction::ScaleIntrinsics { factor: [x, y] } => format!(
+        Defect::IntrinsicsScale { factor: [x, y] } => format!(
             "Multiply fx and cx by {}, fy and cy by {}.",
-            words::trimmed(*x, 5),
-            words::trimmed(*y, 5)
+            words::trimmed(x, 5),
+            words::trimmed(y, 5)
         ),
+        Defect::Distorted => {
+            "Resample the images to straight lines with the tables of this recording, where it \
+                              has none with the own camera model."
+                .to_owned()
+        }
+        Defect::RectifiedTwice => {
+            "Resample the images with the tables of this recording, backwards.".to_owned()
+        }
+        Defect::DepthScale { ratio } => {
+            format!("Divide every depth by {}.", words::plain(ratio, 5))
+        }
+        Defect::DepthBias { bias_m } => {
+            format!("Take {} mm from every depth.", words::plain(1e3 * bias_m, 2))
+        }
+        Defect::DepthZoom { zoom: [x, _] } => format!(
+            "Resample depth to colour: zoom {} about the principal point.",
+            words::plain(x, 4)
+        ),
+        Defect::DepthShift { shift_px: [x, y] } => format!(
+            "Resample depth to colour: it lies {} px too far right and {} px too far down.",
+            words::plain(x, 2),
+            words::plain(y, 2)
+        ),
+        Defect::Mirrored => "Mirror the images back.".to_owned(),
+        Defect::DepthMirrored => "Mirror the depth maps back.".to_owned(),
     };
-    let kind = if correction.changes_data() {
+    let kind = if defect.is_in_data() {
         "It changes the images or the depth."
     } else {
         "It changes metadata only."

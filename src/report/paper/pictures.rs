@@ -1,8 +1,9 @@
 //! Pictures of the published recordings: figures 3 and 7.
 
 use crate::{
-    correct::{Plan, Sampling, Step},
+    correct::Plan,
     image::Rgb,
+    recording::Defect,
     report::{
         After, Animation, DepthPictures, DepthStyle, Error, Flip, LensPictures, Photo, PhotoSize,
         Range, Shown, state_in_words,
@@ -56,7 +57,7 @@ impl PaperPictures {
         });
         if let Some(data) = issue_1 {
             let zoom = [1.0 / ZOOM; 2];
-            let plan = Plan::new(vec![Step::DepthZoom { zoom }], Sampling::EdgeAware)?;
+            let plan = Plan::given(&[Defect::DepthZoom { zoom }])?;
             let drawn = DepthPictures {
                 recording: &data.recording,
                 after: After::Corrected(&plan),

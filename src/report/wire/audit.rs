@@ -10,8 +10,8 @@ use crate::{
     board::{CharucoBoard, Layout},
     calibrate::Estimate,
     depth::{BoardDepth, FrameDepth, NoiseAtRange, Pattern},
-    diagnose::{self, Device, Finding},
-    recording::Factory,
+    diagnose::{Device, Finding},
+    recording::{Defect, Factory},
 };
 
 /// Everything that can be known of a recording.
@@ -289,8 +289,8 @@ pub struct FindingInfo {
     pub summary: String,
     /// What to do now.
     pub what_to_do: String,
-    /// What would make the data true.
-    pub correction: Option<CorrectionInfo>,
+    /// What is wrong, where it could be removed.
+    pub defect: Option<Defect>,
     /// The numbers behind it, by name.
     pub evidence: BTreeMap<String, EvidenceInfo>,
 }
@@ -303,17 +303,6 @@ pub struct EvidenceInfo {
     /// Its standard deviation, where it is an estimate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sigma: Option<f64>,
-}
-
-/// What would make the data true.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct CorrectionInfo {
-    /// `focal`, `principal_point`, `undistort`, `depth`, `align`, `unmirror`, `unmirror_depth` or `scale_intrinsics`.
-    pub kind: String,
-    /// Whether images or depth maps change, not only metadata.
-    pub changes_data: bool,
-    /// Its parameters, by name.
-    pub parameters: BTreeMap<String, f64>,
 }
 
 /// One frame.
@@ -537,7 +526,7 @@ impl From<&Finding> for FindingInfo {
             tolerance: finding.tolerance.and_then(finite),
             summary: finding.summary.clone(),
             what_to_do: finding.what_to_do.clone(),
-            correction: finding.correction.as_ref().map(CorrectionInfo::from),
+            defect: finding.defect,
             evidence: finding
                 .evidence
                 .iter()
@@ -548,33 +537,6 @@ impl From<&Finding> for FindingInfo {
                     )
                 })
                 .collect(),
-        }
-    }
-}
-
-impl From<&diagnose::Correction> for CorrectionInfo {
-    fn from(correction: &diagnose::Correction) -> Self {
-        let parameters: Vec<(&str, f64)> = match correction {
-            diagnose::Correction::Focal { focal_px } => vec![("focal_px", *focal_px)],
-            diagnose::Correction::Depth { scale, bias_m } => {
-                vec![("scale", *scale), ("bias_mm", 1e3 * bias_m)]
-            }
-            diagnose::Correction::PrincipalPoint { center_px: [x, y] } => {
-                vec![("center_x_px", *x), ("center_y_px", *y)]
-            }
-            diagnose::Correction::Align { zoom, shift_px: [x, y] } => {
-                vec![("zoom", *zoom), ("shift_x_px", *x), ("shift_y_px", *y)]
-            }
-            diagnose::Correction::ScaleIntrinsics { factor: [x, y] } => {
-                vec![("factor_x", *x), ("factor_y", *y)]
-            }
-            _ => Vec::new(),
-        };
-        let finite = parameters.into_iter().filter(|(_, value)| value.is_finite());
-        Self {
-            kind: correction.name().to_owned(),
-            changes_data: correction.changes_data(),
-            parameters: finite.map(|(name, value)| (name.to_owned(), value)).collect(),
         }
     }
 }

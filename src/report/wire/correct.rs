@@ -4,17 +4,17 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Audit, FindingInfo, finite};
+use super::{Audit, Distortion, FindingInfo};
 use crate::{
-    camera::{Camera, Intrinsics},
-    correct::{self, Because, Called, Corrected, Lens, Mirrored, Plan, Sampling, Step, Which},
-    diagnose::{Code, DistortionState, Verdict},
+    camera::Intrinsics,
+    correct::{Corrected, Plan, Selection, Step},
+    diagnose::{Code, Verdict},
     recording::Recording,
     report::Error,
 };
 
 /// What was corrected, and from what.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Correct {
     /// Name of the input.
     pub recording: String,
@@ -22,8 +22,10 @@ pub struct Correct {
     pub version: String,
     /// SHA-256 of what `sha256sum *` prints in the input's folder.
     pub input_sha256: String,
-    /// What was done, and why.
-    pub steps: Vec<StepInfo>,
+    /// What was removed, and why.
+    pub steps: Vec<Step>,
+    /// The lens that rectified the images, where that was not the recording's own tables.
+    pub lens: Option<Distortion>,
     /// `edge-aware` or `nearest`.
     pub depth_sampling: String,
     /// The pinhole that the metadata said.
@@ -42,20 +44,6 @@ pub struct Correct {
     pub files: BTreeMap<String, String>,
     /// What the input's own `provenance.json` said, where it was a corrected recording already.
     pub previous: Option<serde_json::Value>,
-}
-
-/// One step.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct StepInfo {
-    /// `scale-intrinsics`, `focal`, `center`, `undistort`, `mirror`, `zoom`, `shift` or `depth`.
-    pub step: String,
-    /// Code of a finding, `camera`, `told` or `equations`.
-    pub because: String,
-    /// What the step took its shape from, where that is no number: `own_tables`, `own_tables_twice`, `tables`,
-    /// `camera`, `both`, `depth`.
-    pub how: Option<String>,
-    /// Its parameters, by name.
-    pub parameters: BTreeMap<String, f64>,
 }
 
 /// A pinhole.
@@ -85,7 +73,8 @@ impl Correct {
             recording: recording.name.clone(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
             input_sha256: done.input_sha256,
-            steps: plan.steps().iter().map(StepInfo::from).collect(),
+            steps: plan.steps().to_vec(),
+            lens: plan.camera().map(|camera| Distortion::from(&camera.distortion)),
             depth_sampling: plan.sampling().name().to_owned(),
             factory_before: done.before.as_ref().map(PinholeInfo::from),
             factory_after: done.after.as_ref().map(PinholeInfo::from),
@@ -95,49 +84,6 @@ impl Correct {
             findings,
             files: done.files.into_iter().map(|f| (f.name, f.sha256)).collect(),
             previous,
-        }
-    }
-}
-
-impl From<&(Step, Because)> for StepInfo {
-    fn from((step, because): &(Step, Because)) -> Self {
-        let camera = |camera: &Camera| {
-            let k = &camera.intrinsics;
-            let mut numbers =
-                vec![("fx_px", k.fx), ("fy_px", k.fy), ("cx_px", k.cx), ("cy_px", k.cy)];
-            if let crate::camera::Distortion::Brown(lens) = &camera.distortion {
-                let [k1, k2, p1, p2, k3] = lens.parameters();
-                numbers.extend([("k1", k1), ("k2", k2), ("p1", p1), ("p2", p2), ("k3", k3)]);
-            }
-            numbers
-        };
-        let (how, parameters) = match step {
-            Step::ScaleIntrinsics { factor: [x, y] } => {
-                (None, vec![("factor_x", *x), ("factor_y", *y)])
-            }
-            Step::Focal { focal_px } => (None, vec![("focal_px", *focal_px)]),
-            Step::Center { center_px: [x, y] } => (None, vec![("cx_px", *x), ("cy_px", *y)]),
-            Step::Undistort(Lens::OwnTables) => (Some("own_tables"), Vec::new()),
-            Step::Undistort(Lens::OwnTablesTwice) => (Some("own_tables_twice"), Vec::new()),
-            Step::Undistort(Lens::Tables(_)) => (Some("tables"), Vec::new()),
-            Step::Undistort(Lens::Camera(own)) => (Some("camera"), camera(own)),
-            Step::Unmirror(what) => (Some(what.name()), Vec::new()),
-            Step::DepthZoom { zoom: [x, y] } => (None, vec![("zoom_x", *x), ("zoom_y", *y)]),
-            Step::DepthShift { shift_px: [x, y] } => {
-                (None, vec![("shift_x_px", *x), ("shift_y_px", *y)])
-            }
-            Step::Depth { scale, bias_m } => {
-                (None, vec![("scale", *scale), ("bias_mm", 1e3 * bias_m)])
-            }
-        };
-        Self {
-            step: step.name().to_owned(),
-            because: because.name().to_owned(),
-            how: how.map(str::to_owned),
-            parameters: parameters
-                .into_iter()
-                .filter_map(|(name, value)| Some((name.to_owned(), finite(value)?)))
-                .collect(),
         }
     }
 }
@@ -161,52 +107,18 @@ impl Audit {
     /// The plan that this audit calls for.
     ///
     /// Errors: a finding of a newer version, a camera that cannot be, a fault that names no way back.
-    pub fn plan(&self, which: Which<'_>, sampling: Sampling) -> Result<Plan, Error> {
-        let camera = self.calibration.as_ref().map(|c| c.camera()).transpose()?;
-        let has_tables = self.device.factory.is_some_and(|factory| factory.has_tables);
-        let unusable = |e: correct::Error| Error::Document(e.to_string());
-        let mut called = Vec::new();
+    pub fn plan(&self, selection: Selection<'_>) -> Result<Plan, Error> {
+        let has_tables = self.device.factory.as_ref().is_some_and(|factory| factory.has_tables);
+        let own = self.calibration.as_ref().filter(|_| !has_tables);
+        let camera = own.map(|c| c.camera()).transpose()?;
+        let mut found = Vec::new();
         for finding in &self.findings {
-            let Some(correction) = &finding.correction else { continue };
+            let Some(defect) = finding.defect else { continue };
             let code: Code = finding.code.parse().map_err(|e| Error::Document(format!("{e}")))?;
-            let number = |name: &str| {
-                correction.parameters.get(name).copied().ok_or_else(|| {
-                    Error::Document(format!("{code}: its correction lacks `{name}`"))
-                })
-            };
-            let steps = match correction.kind.as_str() {
-                "focal" => vec![Step::Focal { focal_px: number("focal_px")? }],
-                "principal_point" => vec![Step::Center {
-                    center_px: [number("center_x_px")?, number("center_y_px")?],
-                }],
-                "undistort" => {
-                    vec![Step::undistort(has_tables, camera.as_ref()).map_err(unusable)?]
-                }
-                "depth" => {
-                    vec![Step::Depth { scale: number("scale")?, bias_m: number("bias_mm")? / 1e3 }]
-                }
-                "align" => vec![
-                    Step::DepthZoom { zoom: [number("zoom")?; 2] },
-                    Step::DepthShift { shift_px: [number("shift_x_px")?, number("shift_y_px")?] },
-                ],
-                "unmirror" => vec![Step::Unmirror(Mirrored::Both)],
-                "unmirror_depth" => vec![Step::Unmirror(Mirrored::Depth)],
-                "scale_intrinsics" => vec![Step::ScaleIntrinsics {
-                    factor: [number("factor_x")?, number("factor_y")?],
-                }],
-                other => {
-                    return Err(Error::Document(format!(
-                        "{code}: no correction is called `{other}`"
-                    )));
-                }
-            };
-            // Before version 0.2 only faults named a correction.
             let is_fault = finding.severity == Verdict::Fault.name();
-            let verdict = if is_fault { Verdict::Fault } else { Verdict::Info };
-            called.push(Called { code, verdict, steps });
+            found.push((code, if is_fault { Verdict::Fault } else { Verdict::Info }, defect));
         }
-        let state = self.distortion_state == DistortionState::RectifiedTwice.name();
-        let state = if state { DistortionState::RectifiedTwice } else { DistortionState::Unknown };
-        Plan::called_for(called, state, which, sampling).map_err(unusable)
+        Plan::of_findings(found, camera.as_ref(), selection)
+            .map_err(|e| Error::Document(e.to_string()))
     }
 }

@@ -2,15 +2,15 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{StepInfo, finite};
+use super::finite;
 use crate::{
-    correct::{Rectifier, Treatment},
+    correct::{Rectifier, Step, Treatment},
     recording::Recording,
     report::{After, DepthPictures, Drawn, LensDrawn, Shown},
 };
 
 /// Depth over colour.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Overlay {
     /// Name of the recording.
     pub recording: String,
@@ -21,7 +21,7 @@ pub struct Overlay {
     /// Depths at the ends of the colours; `null` where each frame has its own.
     pub range_mm: Option<[f64; 2]>,
     /// The corrections shown beside it.
-    pub steps: Vec<StepInfo>,
+    pub steps: Vec<Step>,
     /// The recording shown beside it.
     pub beside: Option<String>,
     /// In order.
@@ -56,7 +56,7 @@ pub struct Undistort {
     pub version: String,
     /// `tables` or `camera`.
     pub lens: String,
-    /// `straight`, `distorted`, `rectified_twice` or `unknown`.
+    /// `rectified`, `distorted`, `rectified_twice` or `unknown`.
     pub state: String,
     /// Frames in which the board was measured.
     pub n_frames_measured: usize,
@@ -113,7 +113,7 @@ impl Overlay {
             shown: shown.to_owned(),
             range_mm: drawn.range_m.map(|range| range.map(|m| 1e3 * m)),
             steps: match pictures.after {
-                After::Corrected(plan) => plan.steps().iter().map(StepInfo::from).collect(),
+                After::Corrected(plan) => plan.steps().to_vec(),
                 _ => Vec::new(),
             },
             beside: match pictures.after {
