@@ -177,8 +177,8 @@ pub(crate) enum Command {
     /// Print at 100 % ("actual size", not "fit to page"), glue it onto something flat, measure squares, and correct
     /// board.toml where the printer has scaled. Then put board.toml into every recording.
     ///
-    /// The board, unless --board says otherwise, is 10x7 squares of 24 mm with markers of 18 mm from 5X5_100. It fills
-    /// A4 and fits Letter; an odd number of rows is the same in OpenCV's old and new layout; markers of 3/4 of a square
+    /// The board, unless --board says otherwise, is 10x7 squares of 24 mm with markers of 15 mm from 5X5_100. It fills
+    /// A4 and fits Letter; an odd number of rows is the same in OpenCV's old and new layout; markers of 5/8 of a square
     /// are read from far, and leave enough white for the corners to be precise.
     #[command(after_help = BOARD_EXAMPLES)]
     Board(PrintArgs),

@@ -22,15 +22,19 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// A file or folder of the shared data (`TRUEDEPTH_DATA`, else `../shared/data` beside the repository). Where the
-/// whole data folder is absent the answer is `None` and one line on stderr says what was skipped; where the folder is
-/// there but the file is not, the test fails: a misspelt name must not pass as "absent".
+/// A file or folder of the shared data: `../shared/data` beside the repository, or where `TRUEDEPTH_DATA` says.
+///
+/// Where that variable is not set and the whole folder is absent the answer is `None`, and one line on stderr says
+/// what was skipped. With `TRUEDEPTH_DATA=required`, or a path, an absent folder fails the test, as does a file that is
+/// not in the folder: a misspelt name must not pass as "absent".
 fn data(relative: &str) -> Option<PathBuf> {
-    let root = env::var_os("TRUEDEPTH_DATA").map_or_else(
+    let told = env::var_os("TRUEDEPTH_DATA");
+    let root = told.as_ref().filter(|told| *told != "required").map_or_else(
         || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
         PathBuf::from,
     );
     if !root.is_dir() {
+        assert!(told.is_none(), "TRUEDEPTH_DATA is set, and {} is not a folder", root.display());
         let test = std::thread::current().name().unwrap_or("a test").to_owned();
         // Written past the harness, which would swallow the output of a test that passes.
         writeln!(std::io::stderr(), "skipped: {test}: {} absent", root.display()).ok();

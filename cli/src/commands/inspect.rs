@@ -96,11 +96,7 @@ fn words(recording: &Recording, inspection: &Inspection<'_>, terminal: &Terminal
     }
     text.push('\n');
     for finding in &inspection.findings {
-        let tone = match finding.verdict {
-            Verdict::Fault => Tone::Bad,
-            Verdict::Warning | Verdict::Unknown => Tone::Unsure,
-            Verdict::Info | Verdict::Ok => Tone::Good,
-        };
+        let tone = Tone::of(finding.verdict);
         let verdict = terminal.paint(tone, &format!("{:<8}", finding.verdict.name()));
         text.push_str(&format!("{}  {verdict}  {}\n", finding.code, finding.summary));
         if !finding.what_to_do.is_empty() && finding.verdict <= Verdict::Warning {

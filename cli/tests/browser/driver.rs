@@ -6,7 +6,7 @@ use std::{
     net::TcpStream,
     path::Path,
     process::{Child, Command, Stdio},
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use serde_json::{Value, json};
@@ -14,6 +14,26 @@ use serde_json::{Value, json};
 /// Where Debian and others put the browser.
 const BROWSERS: [&str; 4] =
     ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
+
+/// How long a page may take to do what is expected of it. Only a failing test ever waits so long.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// Asks until the answer is as expected: a page answers to what is done to it when it gets round to it.
+#[track_caller]
+pub(crate) fn wait_until<T: std::fmt::Debug>(
+    ask: impl Fn() -> T,
+    expected: impl Fn(&T) -> bool,
+) -> T {
+    let deadline = Instant::now() + PATIENCE;
+    loop {
+        let answer = ask();
+        if expected(&answer) {
+            return answer;
+        }
+        assert!(Instant::now() < deadline, "{} s, and still {answer:?}", PATIENCE.as_secs());
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
 
 /// Key codes of the protocol (17.4.2).
 pub(crate) const TAB: char = '\u{e004}';
@@ -149,13 +169,15 @@ impl Browser {
     /// Waits until an expression is true.
     #[track_caller]
     pub(crate) fn wait_for(&self, expression: &str) {
-        for _ in 0..100 {
-            if self.script(&format!("return Boolean({expression})")) == true {
-                return;
-            }
-            std::thread::sleep(Duration::from_millis(50));
-        }
-        panic!("five seconds, and still not: {expression}");
+        let is = format!("return Boolean({expression}) || {expression:?}");
+        wait_until(|| self.script(&is), |answer| *answer == true);
+    }
+
+    /// Waits until the screen has been drawn anew: what has been scrolled has told so, what draws has drawn.
+    pub(crate) fn next_frame(&self) {
+        self.script(
+            "return new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))",
+        );
     }
 
     /// The size of the window and whether it is a phone's.
@@ -177,9 +199,14 @@ impl Browser {
     /// Puts the first element of a selector into the middle of the window; its centre there.
     #[track_caller]
     pub(crate) fn center_of(&self, selector: &str) -> [f64; 2] {
+        self.script(&format!(
+            "document.querySelector({selector:?}).scrollIntoView({{block: 'center', behavior: 'instant'}})"
+        ));
+        // The event of scrolling comes with the next frame, and hides tips: a pointer must not be quicker.
+        self.next_frame();
         let place = self.script(&format!(
-            "const e = document.querySelector({selector:?}); e.scrollIntoView({{block: 'center', behavior: 'instant'}});
-             const b = e.getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2];"
+            "const b = document.querySelector({selector:?}).getBoundingClientRect();
+             return [b.x + b.width / 2, b.y + b.height / 2];"
         ));
         [0, 1].map(|axis| place[axis].as_f64().expect("a number"))
     }

@@ -6,16 +6,13 @@ use serde_json::Value;
 
 use crate::{
     browser,
-    driver::{Browser, ENTER, ESCAPE, HOME, LEFT, Pointer, RIGHT, TAB, UP},
+    driver::{Browser, ENTER, ESCAPE, HOME, LEFT, Pointer, RIGHT, TAB, UP, wait_until},
     simulated_report,
 };
 
 /// Yaw, pitch, distance and target of the view in space.
 fn view(browser: &Browser) -> Vec<f64> {
-    // The drawing follows with the next frame of the screen.
-    browser.script(
-        "return new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))",
-    );
+    browser.next_frame();
     let view = browser.script("return document.getElementById('space-view').dataset.view");
     view.as_str().expect("a view").split(' ').map(|v| v.parse().expect("a number")).collect()
 }
@@ -24,10 +21,6 @@ fn text(browser: &Browser, selector: &str) -> String {
     let text =
         browser.script(&format!("return document.querySelector({selector:?})?.innerText ?? ''"));
     text.as_str().expect("a text").to_owned()
-}
-
-fn tip(browser: &Browser) -> String {
-    text(browser, "#tip:not([hidden])")
 }
 
 fn value(browser: &Browser, selector: &str) -> f64 {
@@ -49,37 +42,25 @@ fn pixels(browser: &Browser, canvas: &str) -> Value {
 fn space(browser: &Browser, pointer: Pointer) {
     let start = view(browser);
     browser.drag(pointer, "#space-view", [0.0, 0.0], [60.0, 20.0]);
-    let turned = view(browser);
-    assert!(
-        turned[0] > start[0] + 0.2 && turned[1] > start[1] + 0.05,
-        "{pointer:?}: {start:?} {turned:?}"
-    );
+    let turned = wait_until(|| view(browser), |v| v[0] > start[0] + 0.2 && v[1] > start[1] + 0.05);
     if pointer == Pointer::Touch {
         browser.pinch("#space-view", 60.0, 180.0);
-        let near = view(browser);
-        assert!(near[2] < 0.6 * turned[2], "two fingers apart come nearer: {turned:?} {near:?}");
+        wait_until(|| view(browser), |near| near[2] < 0.6 * turned[2]);
     }
     browser.click(pointer, "#space-sides [data-side=edge]");
-    let from_the_side = view(browser);
-    assert!((from_the_side[0] - FRAC_PI_2).abs() < 1e-3, "{pointer:?}: {from_the_side:?}");
-    assert_eq!(from_the_side[1], 0.0, "{pointer:?}");
+    wait_until(|| view(browser), |v| (v[0] - FRAC_PI_2).abs() < 1e-3 && v[1] == 0.0);
     let before = pixels(browser, "#space-view");
     browser.click(pointer, "#space-state input[value='1']");
     browser.wait_for("document.getElementById('space-view').dataset.state === '1'");
-    assert_ne!(
-        pixels(browser, "#space-view"),
-        before,
-        "before and after the correction look alike"
-    );
-    assert!(text(browser, "#space-words").contains("after: own camera"));
+    // Before and after the correction do not look alike.
+    wait_until(|| pixels(browser, "#space-view"), |after| *after != before);
+    wait_until(|| text(browser, "#space-words"), |words| words.contains("after: own camera"));
     browser.click(pointer, "#space-colour input[value=distance]");
-    assert_eq!(
-        browser.script("return document.getElementById('space-scale').checkVisibility()"),
-        true
-    );
+    browser.wait_for("document.getElementById('space-scale').checkVisibility()");
     browser.click(pointer, "#closeup-frames label:last-of-type input");
     let frame = text(browser, "#closeup-frames label:last-of-type");
-    assert!(text(browser, "#space-words").starts_with(&format!("Frame {},", frame.trim())));
+    let begins = format!("Frame {},", frame.trim());
+    wait_until(|| text(browser, "#space-words"), |words| words.starts_with(&begins));
 }
 
 fn space_by_keyboard(browser: &Browser) {
@@ -87,18 +68,14 @@ fn space_by_keyboard(browser: &Browser) {
     browser.keys(&[HOME]);
     let start = view(browser);
     browser.keys(&[RIGHT, RIGHT, UP, '+']);
-    let turned = view(browser);
-    assert!(
-        turned[0] > start[0] && turned[1] < start[1] && turned[2] < start[2],
-        "{start:?} {turned:?}"
-    );
+    wait_until(|| view(browser), |v| v[0] > start[0] && v[1] < start[1] && v[2] < start[2]);
     browser.keys(&[HOME]);
-    assert_eq!(view(browser), start);
+    wait_until(|| view(browser), |v| *v == start);
     focus(browser, "#space-state input:checked");
     let state = "return document.querySelector('#space-state input:checked').value";
     let before = browser.script(state);
     browser.keys(&[LEFT]);
-    assert_ne!(browser.script(state), before);
+    wait_until(|| browser.script(state), |after| *after != before);
 }
 
 fn sliders(browser: &Browser, pointer: Pointer) {
@@ -111,18 +88,17 @@ fn sliders(browser: &Browser, pointer: Pointer) {
         };
         let stage = format!("#{figure} .stage");
         browser.drag(pointer, &stage, [0.0, 0.0], [-90.0, 0.0]);
-        let (left, left_cut) = (value(browser, &slider), cut());
-        assert!((5.0..45.0).contains(&left), "{pointer:?} {figure}: {left}");
+        let left = wait_until(|| value(browser, &slider), |left| (5.0..45.0).contains(left));
+        let left_cut = cut();
         browser.drag(pointer, &stage, [0.0, 0.0], [90.0, 0.0]);
-        let right = value(browser, &slider);
-        assert!(right > left + 20.0 && cut() != left_cut, "{pointer:?} {figure}: {left} {right}");
+        let right = wait_until(|| value(browser, &slider), |right| *right > left + 20.0);
+        wait_until(cut, |right_cut| *right_cut != left_cut);
         if pointer == Pointer::Mouse {
             browser.drag(pointer, &slider, [0.0, 0.0], [-80.0, 0.0]);
-            assert!(value(browser, &slider) < right);
+            let before = wait_until(|| value(browser, &slider), |moved| *moved < right);
             focus(browser, &slider);
-            let before = value(browser, &slider);
             browser.keys(&[RIGHT, RIGHT]);
-            assert!(value(browser, &slider) > before, "by keyboard");
+            wait_until(|| value(browser, &slider), |by_keyboard| *by_keyboard > before);
         }
     }
 }
@@ -133,16 +109,16 @@ fn distances(browser: &Browser, pointer: Pointer) {
     browser.click(pointer, "#over input[value=distance]");
     let shown = "const all = document.querySelectorAll('#over .scale-of-colours');
                  return [...all].map((e) => e.checkVisibility()).join()";
-    assert_eq!(browser.script(shown), "false,true");
-    let before = pixels(browser, "#over canvas");
-    assert_ne!(before, depth);
+    wait_until(|| browser.script(shown), |shown| *shown == "false,true");
+    let before = wait_until(|| pixels(browser, "#over canvas"), |before| *before != depth);
     let other = "#space-state input:not(:checked)";
     browser.click(pointer, other);
-    assert_ne!(pixels(browser, "#over canvas"), before, "the correction changes distances");
+    // The correction changes distances.
+    wait_until(|| pixels(browser, "#over canvas"), |after| *after != before);
     browser.click(pointer, other);
-    assert_eq!(pixels(browser, "#over canvas"), before);
+    wait_until(|| pixels(browser, "#over canvas"), |again| *again == before);
     browser.click(pointer, "#over input[value=depth]");
-    assert_eq!(browser.script(shown), "true,false");
+    wait_until(|| browser.script(shown), |shown| *shown == "true,false");
 }
 
 /// Each command that is shown is on the clipboard after one press.
@@ -178,71 +154,72 @@ fn gallery(browser: &Browser, pointer: Pointer) {
     let caption = || text(browser, "dialog[open] figcaption");
     assert_eq!(caption(), "");
     browser.click(pointer, ".frames li:nth-child(2) .zoom");
-    let second = caption();
-    assert!(second.contains("frame 1"), "{second}");
+    let second = wait_until(caption, |caption| caption.contains("frame 1"));
     if pointer == Pointer::Touch {
         browser.drag(pointer, "dialog .picture", [80.0, 0.0], [-80.0, 0.0]);
-        assert!(caption().contains("frame 2"), "a swipe leafs on: {}", caption());
     } else {
         browser.click(pointer, "dialog .steps button:last-child");
-        assert!(caption().contains("frame 2"), "{}", caption());
     }
+    wait_until(caption, |caption| caption.contains("frame 2"));
     browser.keys(&[LEFT]);
-    assert_eq!(caption(), second);
+    wait_until(caption, |caption| *caption == second);
     browser.keys(&[ESCAPE]);
-    assert_eq!(caption(), "");
+    wait_until(caption, String::is_empty);
     // The focus is back where it was: Enter opens the same frame again.
     browser.keys(&[ENTER]);
-    assert_eq!(caption(), second);
+    wait_until(caption, |caption| *caption == second);
     browser.keys(&[ESCAPE]);
+    wait_until(caption, String::is_empty);
     let rings =
         "return getComputedStyle(document.querySelector('.overlay-corners')).display !== 'none'";
     assert_eq!(browser.script(rings), true);
-    browser.click(pointer, "#show-corners");
-    assert_eq!(browser.script(rings), false);
-    browser.click(pointer, "#show-corners");
+    for shown in [false, true] {
+        browser.click(pointer, "#show-corners");
+        wait_until(|| browser.script(rings), |rings| *rings == shown);
+    }
 }
 
 fn hovering(browser: &Browser) {
+    let tip = || text(browser, "#tip:not([hidden])");
     browser.hover("#over .stage", [40.0, 0.0]);
-    assert!(tip(browser).contains("px: ") && tip(browser).contains(" m"), "{}", tip(browser));
+    wait_until(tip, |tip| tip.contains("px: ") && tip.contains(" m"));
     browser.click(Pointer::Mouse, "#space-sides [data-side=front]");
     view(browser);
     browser.hover("#space-view", [0.0, 0.0]);
-    assert!(tip(browser).contains("mm deep"), "{}", tip(browser));
+    wait_until(tip, |tip| tip.contains("mm deep"));
     browser.hover("#depth-frames .plot .mark", [0.0, 0.0]);
-    assert!(tip(browser).contains("frame "), "{}", tip(browser));
+    wait_until(tip, |tip| tip.contains("frame "));
     focus(browser, "#depth-error .plot");
+    browser.next_frame(); // What has the focus is scrolled to, and that hides the tip.
     browser.keys(&[RIGHT]);
-    let first = tip(browser);
-    assert!(first.contains("corners"), "{first}");
+    let first = wait_until(tip, |tip| tip.contains("corners"));
     browser.keys(&[RIGHT]);
-    assert_ne!(tip(browser), first);
+    wait_until(tip, |tip| tip.contains("corners") && *tip != first);
     browser.keys(&[ESCAPE]);
-    assert_eq!(tip(browser), "");
+    wait_until(tip, String::is_empty);
     browser.click(Pointer::Mouse, ".frames li:nth-child(1) .zoom");
+    browser.wait_for("document.querySelector('dialog[open] .overlay-corners circle')");
     browser.hover("dialog .overlay-corners circle", [0.0, 0.0]);
-    assert!(tip(browser).starts_with("corner "), "{}", tip(browser));
+    wait_until(tip, |tip| tip.starts_with("corner "));
     browser.keys(&[ESCAPE]);
+    wait_until(|| text(browser, "dialog[open] figcaption"), String::is_empty);
 }
 
 fn the_rest(browser: &Browser) {
     let paper = "return getComputedStyle(document.body).backgroundColor";
     let light = browser.script(paper);
     browser.click(Pointer::Mouse, "#theme");
-    assert_ne!(browser.script(paper), light);
+    wait_until(|| browser.script(paper), |dark| *dark != light);
     browser.click(Pointer::Mouse, "#theme");
+    wait_until(|| browser.script(paper), |again| *again == light);
     browser.click(Pointer::Mouse, "#views details summary");
-    assert_eq!(
-        browser.script("return document.querySelector('#views tbody').checkVisibility()"),
-        true
-    );
+    browser.wait_for("document.querySelector('#views tbody').checkVisibility()");
 }
 
 /// On a fresh page the first thing that Tab reaches leads past its head.
 fn first_tab(browser: &Browser) {
     browser.keys(&[TAB]);
-    assert_eq!(text(browser, ":focus"), "Skip to the findings");
+    wait_until(|| text(browser, ":focus"), |focused| focused == "Skip to the findings");
 }
 
 #[test]

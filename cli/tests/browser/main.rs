@@ -72,9 +72,10 @@ fn simulated_report(name: &str) -> PathBuf {
     report.join("report.html")
 }
 
-/// Real recordings, where this machine has them.
+/// Real recordings, where this machine has them; `TRUEDEPTH_DATA` as for the library's tests (`tests/it/main.rs`).
 fn real_recordings() -> Option<PathBuf> {
-    let data = std::env::var_os("TRUEDEPTH_DATA").map_or_else(
+    let told = std::env::var_os("TRUEDEPTH_DATA");
+    let data = told.as_ref().filter(|told| *told != "required").map_or_else(
         || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data"),
         PathBuf::from,
     );
@@ -82,6 +83,7 @@ fn real_recordings() -> Option<PathBuf> {
     if recordings.is_dir() {
         return Some(recordings);
     }
+    assert!(told.is_none(), "TRUEDEPTH_DATA is set, and {} is not there", recordings.display());
     println!("skipped: no real recordings at {}", recordings.display());
     None
 }
