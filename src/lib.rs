@@ -15,6 +15,9 @@
 
 // ── Ground: shapes and numbers ──
 
+// The same work on one core or all, in narrow vectors or wide ones.
+mod par;
+
 // Points, pixels, poses and homographies, with frames as types.
 pub mod geom;
 

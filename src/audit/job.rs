@@ -14,6 +14,7 @@ use crate::{
     detect::{Detector, Observation},
     diagnose::{Device, Finding, Verdict},
     image::Rgb,
+    par,
     pose::View,
     recording::{self, Factory, Problem, Recording, StreamState},
 };
@@ -227,21 +228,14 @@ fn look(
     let total = recording.frames.len();
     let done = AtomicUsize::new(0);
     observer(Progress { stage: Stage::Detect, done: 0, total });
-    let one = |index: usize| {
+    let one = |&index: &usize| {
         let frame = look_at(recording, board, &detector, (index, witness));
         let done = 1 + done.fetch_add(1, Ordering::Relaxed);
         observer(Progress { stage: Stage::Detect, done, total });
         frame
     };
-    // Collected in order: the first failing frame is the one that is reported, whatever the threads did.
-    #[cfg(feature = "parallel")]
-    let frames: Vec<_> = {
-        use rayon::prelude::{IntoParallelIterator, ParallelIterator};
-        (0..total).into_par_iter().map(one).collect()
-    };
-    #[cfg(not(feature = "parallel"))]
-    let frames: Vec<_> = (0..total).map(one).collect();
-    frames.into_iter().collect()
+    let frames: Vec<usize> = (0..total).collect();
+    par::try_map(&frames, one)
 }
 
 fn look_at(

@@ -2,7 +2,6 @@
 
 use super::{
     Candidate, Chosen, Error, Estimate, Input, Model, Outlier, RejectedFrame, SurfaceCandidate,
-    abreast::abreast,
     fit::{Data, Fit, Start, Wanted, fit},
     model::{Aspect, Center, Shape, Warp},
     problem::Measured,
@@ -15,6 +14,7 @@ use crate::{
     camera::{Camera, Distortion, Intrinsics},
     detect::Corner,
     geom::{Board, Color, Pose, Vector3},
+    par,
     pose::Weighting,
     solve::{Loss, mean, standard_error},
 };
@@ -163,7 +163,7 @@ fn flexible<'a>(
     let mut closest: Option<Estimate> = None;
     let mut tried = Vec::new();
     for (center, warp) in cameras {
-        let fits = abreast(&surfaces, |surface| {
+        let fits = par::map(&surfaces, |surface| {
             let shape = shape_of(center, warp, *surface);
             Some((shape, fit_with(input, prepared, shape, (loss, Wanted::Camera))?))
         });
@@ -344,7 +344,7 @@ pub(super) fn choose(
     prepared: &Prepared,
     models: &[Model],
 ) -> Result<(Model, Vec<(Candidate, Fit)>), Error> {
-    let fits = abreast(models, |&model| {
+    let fits = par::map(models, |&model| {
         let fit = fit_prepared(input, prepared, model.shape(input.tables, prepared.surface)?)?;
         let focal = fit.focal_px();
         (focal.sigma <= MAX_FOCAL_SIGMA * focal.value).then_some((model, fit))

@@ -2,13 +2,15 @@
 
 use super::{
     DistortionTest, Estimate, Hypothesis, Input, Lens,
-    abreast::abreast,
     auto::{Prepared, behind_sigmas, fit_in_motion, fit_prepared, shape_rms_px},
     fit::Fit,
     model::{Aspect, Center, Shape, Warp, brown},
     surface::Surface,
 };
-use crate::camera::{Intrinsics, RadialTable, TablePair};
+use crate::{
+    camera::{Intrinsics, RadialTable, TablePair},
+    par,
+};
 
 /// Fits every hypothesis; `None` where the views do not determine k1.
 pub(super) fn test(input: &Input<'_>, prepared: &Prepared) -> Option<DistortionTest> {
@@ -21,7 +23,7 @@ pub(super) fn test(input: &Input<'_>, prepared: &Prepared) -> Option<DistortionT
         ]);
     }
     warps.extend([(Lens::FreeRadial, Warp::FreeRadial1), (Lens::FreeRadial, Warp::FreeRadial2)]);
-    let mut found = abreast(&warps, |&(lens, warp)| {
+    let mut found = par::map(&warps, |&(lens, warp)| {
         let shape = shape_of(warp, prepared.surface);
         let fit = fit_in_motion(input, prepared, shape).filter(|fit| fit.covariance.is_some())?;
         let flat = Shape { surface: Surface::Flat, ..shape };

@@ -3,7 +3,6 @@
 use super::{
     Calibration, Candidate, DistortionTest, Error, Input, LeftOutPicture, Method, Model, Parameter,
     RollingShutter,
-    abreast::both,
     auto::{self, MAX_FOCAL_SIGMA, MIN_PICTURES, Prepared},
     distortion,
     fit::{Data, Fit, Start, Wanted, fit},
@@ -14,6 +13,7 @@ use super::{
 };
 use crate::{
     geom::{Board, Point},
+    par,
     pose::View,
     solve::Loss,
 };
@@ -153,9 +153,14 @@ fn robust(
 ) -> Result<Calibration, Error> {
     let shape = model.shape(input.tables, prepared.surface).ok_or(Error::NoTables { model })?;
     let half = |first| auto::half_focal_px(input, &prepared, shape, fit, first);
-    let (distortion, (halves, full)) = both(
+    let (distortion, (halves, full)) = par::join(
         || distortion::test(input, &prepared),
-        || both(|| both(|| half(0), || half(1)), || auto::in_full(input, &prepared, shape, fit)),
+        || {
+            par::join(
+                || par::join(|| half(0), || half(1)),
+                || auto::in_full(input, &prepared, shape, fit),
+            )
+        },
     );
     let full = full.ok_or_else(|| auto::underdetermined(&prepared, None))?;
     let parts = Parts { method, model, shape, candidates };

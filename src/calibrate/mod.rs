@@ -41,8 +41,6 @@
 //!
 //! Not here: images, files, verdicts.
 
-mod abreast;
-
 mod model;
 
 mod surface;
@@ -78,7 +76,6 @@ mod synthetic;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use abreast::{abreast, both};
 pub use coverage::{Coverage, Tilt, coverage};
 pub use guess::guess_intrinsics;
 pub use job::{MAX_VIEWS, calibrate, calibrate_from, distortion_test};

@@ -591,14 +591,14 @@ fn order_of_many_frames_does_not_matter() {
 }
 
 /// One thread and three give the same bits.
-#[cfg(feature = "parallel")]
 #[test]
 fn threads_do_not_matter() {
     let tables = tables();
     let frames = Scene { wave_m: 3e-4, ..Scene::new(Distortion::None) }.frames(9);
     let on = |n| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
-        format!("{:?}", pool.install(|| run(&frames, Some(&tables), Method::Auto).unwrap()))
+        let result =
+            crate::par::on_threads(n, || run(&frames, Some(&tables), Method::Auto).unwrap());
+        format!("{result:?}")
     };
     assert_eq!(on(1), on(3));
 }

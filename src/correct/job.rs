@@ -10,6 +10,7 @@ use super::{
 use crate::{
     camera::Intrinsics,
     image::{DepthMap, Rgb},
+    par,
     recording::{Amendment, Factory, Recording, Sink, encode_depth},
 };
 
@@ -67,7 +68,7 @@ pub fn correct<S: Sink>(
     correct_observed(recording, plan, sink, &mut |_| {})
 }
 
-/// As [`correct`]; calls `observer` after every batch of frames.
+/// As [`correct`]; calls `observer` after every frame.
 pub fn correct_observed<S: Sink>(
     recording: &Recording,
     plan: &Plan,
@@ -86,26 +87,21 @@ pub fn correct_observed<S: Sink>(
     let mut n_depths = [0; 2];
     // Batches bound the memory, whatever the number of frames.
     const BATCH: usize = 16;
-    for first in (0..total).step_by(BATCH) {
-        let batch = first..total.min(first + BATCH);
-        let end = batch.end;
-        let one = |index: usize| corrector.frame(index);
-        #[cfg(feature = "parallel")]
-        let done: Vec<Result<Vec<Output<'_>>, Error>> = {
-            use rayon::prelude::{IntoParallelIterator, ParallelIterator};
-            batch.into_par_iter().map(one).collect()
-        };
-        #[cfg(not(feature = "parallel"))]
-        let done: Vec<Result<Vec<Output<'_>>, Error>> = batch.map(one).collect();
-        for outputs in done {
-            for output in outputs? {
+    let frames: Vec<usize> = (0..total).collect();
+    par::try_batches(
+        &frames,
+        BATCH,
+        |&frame| corrector.frame(frame),
+        |frame, outputs| {
+            for output in outputs {
                 sink.write(output.name, &output.bytes)?;
                 n_depths = [0, 1].map(|i| n_depths[i] + output.n_depths[i]);
                 hashes[slot(output.name)] = Some(output.hash);
             }
-        }
-        observer(Progress { done: end, total });
-    }
+            observer(Progress { done: frame + 1, total });
+            Ok::<_, Error>(())
+        },
+    )?;
     let amendment = |timestamp| {
         let frame = recording.frame_at(timestamp);
         let factory = frame.and_then(|f| f.factory.as_deref()).or(recording.factory());

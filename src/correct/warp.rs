@@ -7,7 +7,7 @@
 use super::{PixelMap, Sampling};
 use crate::{
     image::{DepthMap, Rgb},
-    solve::vectorized,
+    par::vectorized,
 };
 
 /// Neighbours that differ by more than this part of their depth lie on different surfaces. A plane seen at 75 degrees

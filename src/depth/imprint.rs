@@ -10,8 +10,9 @@ use super::{
 
 use crate::{
     board::{CharucoBoard, Layout},
-    calibrate::{Estimate, abreast},
+    calibrate::Estimate,
     geom::Pixel,
+    par,
     solve::mad_sigma,
 };
 
@@ -396,7 +397,7 @@ impl Looks<'_> {
     /// The normal equations at a place, and by how much they say that it is off, to be added to it.
     fn off<const M: usize>(&self, place: &Place) -> Option<(Vec<Normal>, Vector4<f64>)> {
         let frames: Vec<usize> = (0..self.textures.len()).collect();
-        let each = abreast(&frames, |&i| {
+        let each = par::map(&frames, |&i| {
             let spot = |pixel| (self.spot)(i, place, pixel);
             Normal::new(self.print, (i, self.textures[i]), place, spot, self.lens)
         });

@@ -15,10 +15,11 @@ use super::{
 };
 use crate::{
     board::CharucoBoard,
-    calibrate::{BoardSurface, Estimate, Parameter, abreast, both, pictures_of},
+    calibrate::{BoardSurface, Estimate, Parameter, pictures_of},
     camera::Camera,
     detect::Corner,
     geom::Pixel,
+    par,
     pose::View,
     solve::mad_sigma,
 };
@@ -191,7 +192,7 @@ pub fn register(input: &RegisterInput<'_>) -> Option<Registration> {
     let prior = Prior::new(scene.relief.plane_covariance());
     let planes_at = |theta: &Numbers, with_camera: bool| -> Option<Vec<Plane>> {
         let planes =
-            abreast(&frames, |(stance, patches)| scene.plane(stance, patches, theta, with_camera));
+            par::map(&frames, |(stance, patches)| scene.plane(stance, patches, theta, with_camera));
         let numbered = planes.into_iter().zip(&pictures);
         let planes: Vec<Plane> = numbered
             .filter_map(|(plane, picture)| Some(Plane { picture: *picture, ..plane? }))
@@ -218,7 +219,7 @@ pub fn register(input: &RegisterInput<'_>) -> Option<Registration> {
         theta += step.delta;
         Some((planes, step, theta))
     };
-    let (print, found) = both(|| Print::new(board), by_slopes);
+    let (print, found) = par::join(|| Print::new(board), by_slopes);
     let (planes, step, theta) = found?;
     let textures: Vec<&Texture> = frames.iter().map(|(_, patches)| &patches.texture).collect();
     let look = |frame: usize, place: &Place, at| {

@@ -2,11 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::{
-    geom::Pixel,
-    image::DepthMap,
-    solve::{mad_sigma, vectorized},
-};
+use crate::{geom::Pixel, image::DepthMap, par::vectorized, solve::mad_sigma};
 
 /// What is rough in a depth map round the board: cells of some pixels, the frame's own plane and the mean over the
 /// neighbourhood taken out.

@@ -12,7 +12,7 @@
 
 use std::collections::BTreeMap;
 
-use super::simd::vectorized;
+use crate::par::vectorized;
 
 /// Reach of the blur's kernel, bits to each side.
 const REACH: i32 = 3;

@@ -20,13 +20,13 @@ use crate::{
     board::{CharucoBoard, Layout},
     geom::Pixel,
     image::Gray,
+    par::dot,
 };
 
 use super::{
     blurred::{BlurModel, Contest, Entrant, MOST_CELLS, MOST_TRIALS, Won},
     lattice::Lattice,
     map::SmoothMap,
-    simd::dot,
 };
 
 /// How a lattice lies on the board.

@@ -7,13 +7,12 @@
 
 use std::collections::{BTreeSet, VecDeque};
 
-use crate::geom::Pixel;
+use crate::{geom::Pixel, par::vectorized};
 
 use super::{
     map::{SmoothMap, length},
     pyramid::Level,
     saddle::Saddle,
-    simd::vectorized,
 };
 
 /// Corners numbered along two axes. In the image, the axis j lies clockwise of i, as y lies of x.

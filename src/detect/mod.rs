@@ -35,7 +35,6 @@ mod map;
 mod pyramid;
 mod refine;
 mod saddle;
-mod simd;
 mod trace;
 mod window;
 

@@ -1,8 +1,6 @@
 //! A smoothed image at a fraction of the resolution, on which corners are sought.
 
-use crate::{geom::Pixel, image::Gray};
-
-use super::simd::vectorized;
+use crate::{geom::Pixel, image::Gray, par::vectorized};
 
 /// One level: every pixel averages a block of the image, then a binomial filter (1 4 6 4 1)/16 runs along both axes.
 ///

@@ -17,12 +17,11 @@
 
 use fearless_simd::{Level as Processor, Simd, dispatch};
 
-use crate::{geom::Pixel, image::Gray};
+use crate::{geom::Pixel, image::Gray, par::vectorized};
 
 use super::{
     map::length,
     pyramid::Level,
-    simd::vectorized,
     window::{Cross, Slope, Window},
 };
 

@@ -12,10 +12,9 @@
 
 use std::array;
 
-use super::{
-    pyramid::{Level, UNITS},
-    simd::vectorized,
-};
+use crate::par::vectorized;
+
+use super::pyramid::{Level, UNITS};
 
 /// A crossing of two edges.
 #[derive(Clone, Copy, Debug)]

@@ -19,7 +19,7 @@ pub use depth_map::DepthMap;
 pub use gray::Gray;
 pub use rgb::Rgb;
 
-use crate::solve::vectorized;
+use crate::par::vectorized;
 
 /// Adds every pixel, converted. Pixels are many: as vectors, which `convert` is part of where it is
 /// `#[inline(always)]`.

@@ -5,7 +5,8 @@ use nalgebra::Vector3;
 use crate::{
     camera::Camera,
     geom::{Board, Color, Pixel, Point, Pose, Rotation},
-    solve::{Arrow, BlockNormal, Bordered, BySchur, Effort, Row, minimize, vectorized},
+    par::vectorized,
+    solve::{Arrow, BlockNormal, Bordered, BySchur, Effort, Row, minimize},
 };
 
 /// A board point, where it was seen, and the weight of both its residuals.

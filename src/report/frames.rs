@@ -1,7 +1,7 @@
 //! Which frames are drawn, and how they are gone through: in batches on all cores, results in order.
 
 use super::Error;
-use crate::recording::Recording;
+use crate::{par, recording::Recording};
 
 /// Frames worked on at once: bounds the memory, whatever the number of frames.
 const BATCH: usize = 8;
@@ -26,25 +26,13 @@ pub(super) fn spread(frames: &[usize], most: usize) -> Vec<usize> {
     (0..most).map(|i| frames[i * (frames.len() - 1) / (most - 1).max(1)]).collect()
 }
 
-/// Works on items in batches, on all cores, and hands the results on in order. The first error, in order, ends it.
-pub(super) fn in_batches<I: Sync, T: Send, E: Send>(
-    items: &[I],
-    work: impl Fn(&I) -> Result<T, E> + Sync,
-    mut take: impl FnMut(usize, T) -> Result<(), E>,
-) -> Result<(), E> {
-    for (batch, items) in items.chunks(BATCH).enumerate() {
-        #[cfg(feature = "parallel")]
-        let done: Vec<Result<T, E>> = {
-            use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
-            items.par_iter().map(&work).collect()
-        };
-        #[cfg(not(feature = "parallel"))]
-        let done: Vec<Result<T, E>> = items.iter().map(&work).collect();
-        for (index, result) in done.into_iter().enumerate() {
-            take(batch * BATCH + index, result?)?;
-        }
-    }
-    Ok(())
+/// Works on frames in batches, on all cores, and hands the results on in order. The first error, in order, ends it.
+pub(super) fn in_batches<T: Send>(
+    frames: &[usize],
+    work: impl Fn(&usize) -> Result<T, Error> + Sync,
+    take: impl FnMut(usize, T) -> Result<(), Error>,
+) -> Result<(), Error> {
+    par::try_batches(frames, BATCH, work, take)
 }
 
 #[cfg(test)]
@@ -52,19 +40,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn in_order_and_up_to_the_first_error() {
+    fn evenly_spread() {
         let items: Vec<usize> = (0..50).collect();
-        let mut seen = Vec::new();
-        let error = in_batches(
-            &items,
-            |&i| if i == 30 || i == 31 { Err(i) } else { Ok(i * i) },
-            |index, value| {
-                assert_eq!(value, index * index);
-                seen.push(index);
-                Ok(())
-            },
-        );
-        assert_eq!((error, seen), (Err(30), (0..30).collect()));
         assert_eq!(spread(&items, 3), [0, 24, 49]);
         assert_eq!(spread(&items[..2], 3), [0, 1]);
         assert_eq!(spread(&items, 1), [0]);

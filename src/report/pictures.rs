@@ -9,6 +9,7 @@ use super::photo::{Photo, PhotoSize, base64};
 use crate::{
     audit::{Audit, FrameAudit},
     image::{DepthMap, Rgb},
+    par,
     recording::{self, Recording},
 };
 
@@ -119,22 +120,9 @@ impl Pictures {
             Ok(Photo::new(frame, &recording.rgb(frame)?, size))
         };
         let closeup = |&frame: &usize| Ok(Closeup::new(frame, &recording.depth(frame)?));
-        #[cfg(feature = "parallel")]
-        let (photos, closeups) = {
-            use rayon::prelude::{IntoParallelRefIterator, ParallelIterator};
-            (
-                choice.photos.par_iter().map(photo).collect::<Vec<_>>(),
-                choice.closeups.par_iter().map(closeup).collect::<Vec<_>>(),
-            )
-        };
-        #[cfg(not(feature = "parallel"))]
-        let (photos, closeups) = (
-            choice.photos.iter().map(photo).collect::<Vec<_>>(),
-            choice.closeups.iter().map(closeup).collect::<Vec<_>>(),
-        );
         Ok(Self {
-            photos: photos.into_iter().collect::<Result<_, recording::Error>>()?,
-            closeups: closeups.into_iter().collect::<Result<_, recording::Error>>()?,
+            photos: par::try_map(&choice.photos, photo)?,
+            closeups: par::try_map(&choice.closeups, closeup)?,
         })
     }
 }

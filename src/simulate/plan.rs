@@ -16,6 +16,7 @@ use crate::{
     camera::{Camera, Distortion, Intrinsics, RadialTable, TablePair},
     geom::Pixel,
     image::{DepthMap, Rgb},
+    par,
     recording::{Defect, Error, Factory, Sink, StreamState, Writer, encode_depth},
 };
 
@@ -262,32 +263,28 @@ impl Plan {
         Truth::of(self)
     }
 
-    /// Writes the recording, with `board.toml` and `truth.json`. `done` is called after every batch of frames with the
-    /// number of frames written.
+    /// Writes the recording, with `board.toml` and `truth.json`. `done` is called after every frame with the number
+    /// of frames written.
     pub fn write<S: Sink>(&self, sink: S, mut done: impl FnMut(usize)) -> Result<S, Error> {
         let mut writer = Writer::new(sink);
         let factory = self.factory();
-        let encode = |frame: usize| {
-            let simulated = self.frame(frame);
-            let files = (simulated.color.to_png(), encode_depth(&simulated.depth));
-            (simulated.timestamp, files)
-        };
         // Batches bound the memory, whatever the number of frames.
         const BATCH: usize = 16;
         let frames: Vec<usize> = (0..self.n_frames).collect();
-        for batch in frames.chunks(BATCH) {
-            #[cfg(feature = "parallel")]
-            let encoded: Vec<_> = {
-                use rayon::prelude::*;
-                batch.par_iter().map(|&frame| encode(frame)).collect()
-            };
-            #[cfg(not(feature = "parallel"))]
-            let encoded: Vec<_> = batch.iter().map(|&frame| encode(frame)).collect();
-            for (timestamp, (color_png, depth_png)) in encoded {
+        par::try_batches(
+            &frames,
+            BATCH,
+            |&frame| {
+                let simulated = self.frame(frame);
+                let files = (simulated.color.to_png(), encode_depth(&simulated.depth));
+                Ok((simulated.timestamp, files))
+            },
+            |frame, (timestamp, (color_png, depth_png))| {
                 writer.encoded_frame(timestamp, &color_png, &depth_png, &factory)?;
-            }
-            done(batch[batch.len() - 1] + 1);
-        }
+                done(frame + 1);
+                Ok(())
+            },
+        )?;
         let board = CharucoBoard { layout: Some(self.layout()), ..self.board.clone() };
         writer.board(&board)?;
         writer.file("truth.json", self.truth().to_json().as_bytes())?;
@@ -528,14 +525,10 @@ mod tests {
 
     /// Same plan, same bytes: on one thread and on three.
     #[test]
-    #[cfg(feature = "parallel")]
     fn threads_change_nothing() {
         let mut plan = plan("ipad-12.9-4gen", &["bent=0.8mm", "depth-zoom=0.95"]);
         plan.n_frames = 3;
-        let on = |threads: usize| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| written(&plan))
-        };
+        let on = |threads| par::on_threads(threads, || written(&plan));
         let (one, three) = (on(1), on(3));
         assert_eq!(one.files(), three.files());
         let other = Plan { seed: 6, ..plan.clone() };

@@ -8,6 +8,7 @@ use super::{
 use crate::{
     geom::{Pixel, Point},
     image::{Gray, Rgb},
+    par,
 };
 
 /// An image and what is true of it.
@@ -66,14 +67,7 @@ impl Plane {
         /// Enough to share the work at a band's edge, few enough to keep all cores busy.
         const ROWS: usize = 16;
         let size = ROWS * self.stride();
-        #[cfg(feature = "parallel")]
-        {
-            use rayon::prelude::*;
-            let bands = self.values.par_chunks_mut(size).enumerate();
-            bands.for_each(|(i, values)| band(i * ROWS, values));
-        }
-        #[cfg(not(feature = "parallel"))]
-        self.values.chunks_mut(size).enumerate().for_each(|(i, values)| band(i * ROWS, values));
+        par::for_each_chunk(&mut self.values, size, |i, values| band(i * ROWS, values));
     }
 
     /// Calls `row(index, values)` for every row with its rim.

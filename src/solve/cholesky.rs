@@ -5,7 +5,7 @@
     reason = "triangular loops over two indices read as the formulas do"
 )]
 
-use super::simd::{dot, vectorized};
+use crate::par::{dot, vectorized};
 
 /// A symmetric positive definite matrix as L·Lᵀ.
 #[derive(Clone, Copy, Debug)]

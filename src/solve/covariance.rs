@@ -1,9 +1,7 @@
 //! How sure shared parameters are, their blocks' own parameters marginalised.
 
-use super::{
-    DenseCholesky, Reduced,
-    simd::{dot, vectorized},
-};
+use super::{DenseCholesky, Reduced};
+use crate::par::{dot, vectorized};
 
 /// The sum of what all blocks say.
 ///

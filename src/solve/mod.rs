@@ -43,8 +43,6 @@
 //!
 //! Not here: cameras, poses, pixels; large or sparse systems of other shapes.
 
-mod simd;
-
 mod stats;
 
 mod loss;
@@ -68,5 +66,4 @@ pub use lm::{Effort, LeastSquares, Minimum, Solution, minimize};
 pub use loss::Loss;
 pub use mixture::Mixture;
 pub use schur::{Arrow, ArrowNormal, BlockNormal, Bordered, BySchur, Reduced, Response, Row};
-pub(crate) use simd::vectorized;
 pub use stats::{mad_sigma, mean, median, quantile, rms, standard_deviation, standard_error};

@@ -5,7 +5,8 @@
     reason = "index loops over small matrices read as the formulas do"
 )]
 
-use super::{Cholesky, DenseCholesky, LeastSquares, Solution, simd::vectorized};
+use super::{Cholesky, DenseCholesky, LeastSquares, Solution};
+use crate::par::vectorized;
 
 /// A least-squares problem of `S` shared parameters, any number of *loose* ones, and any number of blocks of `B`
 /// parameters each: a residual depends on the shared parameters, on one block, and on one loose parameter at most (or

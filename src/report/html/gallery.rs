@@ -4,7 +4,7 @@ use maud::{Markup, PreEscaped, html};
 
 use crate::{
     audit::{Audit, FrameAudit},
-    calibrate::abreast,
+    par,
     report::{overlay::Overlay, photo::Photo, pictures::rms_px, svg::n, words},
 };
 
@@ -15,7 +15,7 @@ pub(super) fn gallery(audit: &Audit, photos: &[Photo]) -> Option<Markup> {
     if shown.is_empty() {
         return None;
     }
-    let pictures = abreast(&shown, |(photo, frame)| picture(audit, photo, frame));
+    let pictures = par::map(&shown, |(photo, frame)| picture(audit, photo, frame));
     Some(html! {
         section class="gallery" id="frames" aria-labelledby="frames-title" {
             h2 id="frames-title" { "What the detector saw" }

@@ -14,7 +14,7 @@ use super::{
     pictures::Pictures,
     words,
 };
-use crate::{audit::Audit, calibrate::both};
+use crate::{audit::Audit, par};
 
 /// Nothing may be loaded, from anywhere: images come as `data:`, style and script stand in the page.
 const POLICY: &str = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; \
@@ -41,10 +41,10 @@ pub(super) fn head(title: &str, style: &str) -> Markup {
 /// Everything that comes out of a file is escaped. The same audit and pictures give the same bytes.
 pub fn page(audit: &Audit, pictures: &Pictures, typed: &Typed) -> String {
     let title = format!("{} · truedepth audit", audit.name);
-    let (evidence, (closeups, gallery)) = both(
+    let (evidence, (closeups, gallery)) = par::join(
         || evidence(audit),
         || {
-            both(
+            par::join(
                 || closeups::closeups(audit, pictures),
                 || gallery::gallery(audit, &pictures.photos),
             )
