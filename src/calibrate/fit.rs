@@ -271,12 +271,22 @@ fn shutter<const S: usize>(
     poses: &[Pose<Color, Board>],
 ) -> Option<Shutter> {
     let n_residuals: usize = problem.views.iter().map(|view| 2 * view.corners.len()).sum();
+    let views: Option<Vec<_>> = (poses.iter().enumerate())
+        .map(|(index, pose)| problem.moving_view(index, (shared, knots_m), pose))
+        .collect();
+    let views = views?;
     let likely = |motion: f64| -> Option<(f64, Shutter)> {
         let sigma = MOTION_SIGMA.map(|sigma| motion * sigma);
         let mut all = normal.prior.clone();
         let (mut gain, mut cost, mut unlikely) = (0.0, 0.0, 0.0);
-        for (index, pose) in poses.iter().enumerate() {
-            let block = problem.moving_view(index, (shared, knots_m), pose, sigma)?;
+        for view in &views {
+            // Velocities are near zero, to these σ.
+            let mut block = view.clone();
+            for (k, sigma) in sigma.into_iter().enumerate() {
+                let mut unit = [0.0; 12];
+                unit[6 + k] = 1.0;
+                block.add_row(sigma.powi(-2), 0.0, &[0.0; S], &unit);
+            }
             let (by_own, log_determinant) = block.block_gain()?;
             gain += by_own;
             unlikely += log_determinant + 2.0 * sigma.iter().map(|sigma| sigma.ln()).sum::<f64>();

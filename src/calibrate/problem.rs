@@ -8,14 +8,14 @@ use fearless_simd::{Level, Simd, dispatch, f64x8, prelude::*};
 
 use super::{
     model::{Aspect, Center, Shape, Warp, brown},
-    surface::Sheet,
+    surface::{Sheet, Surface},
 };
 use crate::{
     camera::{Brown, Intrinsics, RadialTable},
     detect::Corner,
     geom::{Board, Color, Matrix3, Pixel, Pose, Vector3},
     pose,
-    solve::{BlockNormal, Bordered, LANES, Loss, Rows, Sums, sum},
+    solve::{BlockNormal, Bordered, LANES, Loss, MAX_PARAMETERS, Rows, Sums, Totals, sum},
 };
 
 /// One view as the solver sees it.
@@ -39,11 +39,10 @@ pub(super) struct Reprojection<'a, const S: usize> {
     pub(super) sheet: &'a Sheet,
 }
 
-/// Eight pixels and their derivatives.
-struct Drawn<I: Simd, const S: usize> {
+/// Eight pixels and their derivatives by the points.
+struct Drawn<I: Simd> {
     pixel: [f64x8<I>; 2],
     by_point: [[f64x8<I>; 3]; 2],
-    by_shared: [[f64x8<I>; S]; 2],
 }
 
 /// The camera of one state, ready to project.
@@ -94,12 +93,14 @@ impl<'a, const S: usize> Reprojection<'a, S> {
 
 impl Ready<'_> {
     /// Where points of the camera's frame are drawn; `None` where one is behind the camera or outside the lens' domain.
+    /// The derivatives by the camera's free numbers are written to `by_shared`.
     #[inline(always)]
-    fn project<I: Simd, const S: usize>(
+    fn project<I: Simd>(
         &self,
         simd: I,
         [x, y, z]: [f64x8<I>; 3],
-    ) -> Option<Drawn<I, S>> {
+        by_shared: &mut [&mut [f64x8<I>]; 2],
+    ) -> Option<Drawn<I>> {
         if !z.simd_gt(0.0).all_true() {
             return None;
         }
@@ -108,11 +109,10 @@ impl Ready<'_> {
         let zero = splat(0.0);
         let inverse_z = splat(1.0) / z;
         let [u, v] = [x * inverse_z, y * inverse_z];
-        let mut by_shared = [[zero; S]; 2];
         // Derivatives by the ray, and those by focal length and centre.
         let (pixel, [[a, b], [c, d]]) = match &self.lens {
             ReadyLens::None => {
-                self.by_pinhole(&mut by_shared, [u, v], [[splat(1.0), zero], [zero, splat(1.0)]]);
+                self.by_pinhole(by_shared, [u, v], [[splat(1.0), zero], [zero, splat(1.0)]]);
                 ([u * fx + cx, v * fy + cy], [[splat(fx), zero], [zero, splat(fy)]])
             }
             ReadyLens::Table(table, whole) => {
@@ -143,7 +143,7 @@ impl Ready<'_> {
                 let load = |numbers: [f64; LANES]| f64x8::simd_from(simd, numbers);
                 let [a, b] = [load(j[0][0]), load(j[0][1])];
                 let [c, d] = [load(j[1][0]), load(j[1][1])];
-                self.by_pinhole(&mut by_shared, [u, v], [[a, b], [c, d]]);
+                self.by_pinhole(by_shared, [u, v], [[a, b], [c, d]]);
                 ([load(pixel[0]), load(pixel[1])], [[a * fx, b * fy], [c * fx, d * fy]])
             }
             ReadyLens::Brown { lens: brown, first_dip } => {
@@ -158,7 +158,7 @@ impl Ready<'_> {
                     return None;
                 }
                 let [x, y] = brown.polynomial([u, v]);
-                self.by_pinhole(&mut by_shared, [x, y], [[splat(1.0), zero], [zero, splat(1.0)]]);
+                self.by_pinhole(by_shared, [x, y], [[splat(1.0), zero], [zero, splat(1.0)]]);
                 let [k_x, k_y] = Brown::by_parameters([u, v]);
                 for i in 0..self.n_warp {
                     by_shared[0][3 + i] = k_x[i] * fx;
@@ -171,14 +171,14 @@ impl Ready<'_> {
             [a * inverse_z, b * inverse_z, -(a * u + b * v) * inverse_z],
             [c * inverse_z, d * inverse_z, -(c * u + d * v) * inverse_z],
         ];
-        Some(Drawn { pixel, by_point, by_shared })
+        Some(Drawn { pixel, by_point })
     }
 
     /// Derivatives by focal length and centre of (fx·x + cx, fy·y + cy), followed by a map with this Jacobian.
     #[inline(always)]
-    fn by_pinhole<I: Simd, const S: usize>(
+    fn by_pinhole<I: Simd>(
         &self,
-        by_shared: &mut [[f64x8<I>; S]; 2],
+        by_shared: &mut [&mut [f64x8<I>]; 2],
         [x, y]: [f64x8<I>; 2],
         [[a, b], [c, d]]: [[f64x8<I>; 2]; 2],
     ) {
@@ -220,59 +220,24 @@ fn gather<I: Simd, T>(simd: I, items: &[T], number: impl Fn(&T) -> f64) -> f64x8
     )
 }
 
-/// What a view's own parameters are.
-trait Own<const B: usize> {
-    /// Derivatives by them, from those by the pose and the time at which the corner's row is read (from −½ at the top
-    /// to ½ at the bottom of the image).
-    fn derivatives<I: Simd>(by_pose: [f64x8<I>; 6], time: f64x8<I>) -> [f64x8<I>; B];
+/// The normal equations of a view, of as many parameters as there are.
+struct ViewSums {
+    totals: Totals,
+    /// Half the (robust) sum of squares.
+    half_rho: f64,
+    /// For each corner, where heights are free, by its height: the other parameters' products, its own, and the
+    /// right-hand side.
+    by_height: Vec<f64>,
 }
 
-/// A pose.
-struct Still;
-
-/// A pose, and by how much it changes from the first row to the last.
-struct Moving;
-
-impl Own<6> for Still {
-    #[inline(always)]
-    fn derivatives<I: Simd>(by_pose: [f64x8<I>; 6], _: f64x8<I>) -> [f64x8<I>; 6] {
-        by_pose
-    }
-}
-
-impl Own<12> for Moving {
-    #[inline(always)]
-    fn derivatives<I: Simd>(by_pose: [f64x8<I>; 6], time: f64x8<I>) -> [f64x8<I>; 12] {
-        let mut by = [time; 12];
-        for k in 0..6 {
-            (by[k], by[6 + k]) = (by_pose[k], time * by_pose[k]);
-        }
-        by
-    }
-}
+/// How many numbers a pose has.
+const POSE: usize = 6;
 
 impl<const S: usize> Reprojection<'_, S> {
-    /// Adds all residuals of a view.
-    fn add_view<O: Own<B>, const B: usize>(
+    /// Adds all residuals of a view. Its own parameters are its pose, and where there are twice as many by how much
+    /// this changes from the first row to the last.
+    fn add_view<const B: usize>(
         &self,
-        index: usize,
-        numbers: (&[f64; S], &[f64]),
-        pose: &Pose<Color, Board>,
-        normal: &mut BlockNormal<S, B>,
-    ) -> bool {
-        let whole = dispatch!(Level::new(), simd => {
-            self.add_corners::<_, O, B>(simd, index, numbers, pose, normal)
-        });
-        if let Some(mixture) = self.sheet.mixture(self.shape.surface) {
-            normal.mix_loose(mixture);
-        }
-        whole
-    }
-
-    #[inline(always)]
-    fn add_corners<I: Simd, O: Own<B>, const B: usize>(
-        &self,
-        simd: I,
         index: usize,
         (shared, knots_m): (&[f64; S], &[f64]),
         pose: &Pose<Color, Board>,
@@ -281,18 +246,87 @@ impl<const S: usize> Reprojection<'_, S> {
         if !(shared[0] > 0.0) {
             return false;
         }
-        let ready = self.ready(shared);
-        let view = self.views[index];
-        let m = pose.rotation.matrix();
-        let surface = self.shape.surface;
-        let numbers = self.shape.surface_numbers(shared);
-        let first = S - numbers.len();
-        let per_row = (self.factory.height as f64).recip();
+        let view = ReadyView {
+            ready: self.ready(shared),
+            view: self.views[index],
+            surface: self.shape.surface,
+            surface_numbers: self.shape.surface_numbers(shared),
+            knots_m,
+            sheet: self.sheet,
+            loss: self.loss,
+            per_row: (self.factory.height as f64).recip(),
+            n_own: B,
+            n_shared: S,
+        };
+        let Some(sums) = view.sums(pose) else { return false };
+        sums.totals.add_to(normal);
+        normal.add_cost(sums.half_rho);
+        let corners = &self.views[index].corners;
         if !knots_m.is_empty() {
-            normal.reserve_loose(view.corners.len());
+            normal.reserve_loose(corners.len());
         }
-        let mut sums = Sums::<I, S, B>::zero(simd);
-        let mut cost = f64x8::splat(simd, 0.0);
+        for (corner, numbers) in corners.iter().zip(sums.by_height.chunks(B + S + 2)) {
+            let by_block = std::array::from_fn(|i| numbers[i]);
+            let by_shared = std::array::from_fn(|i| numbers[B + i]);
+            let own = (numbers[B + S], numbers[B + S + 1]);
+            normal.push_loose(corner.id, (by_shared, by_block), own);
+        }
+        if let Some(mixture) = self.sheet.mixture(self.shape.surface) {
+            normal.mix_loose(mixture);
+        }
+        true
+    }
+
+    /// The normal equations of a view that moves while its rows are read: its pose, and by how much it turns and shifts
+    /// from the first row to the last; `None` outside the problem's domain.
+    pub(super) fn moving_view(
+        &self,
+        index: usize,
+        numbers: (&[f64; S], &[f64]),
+        pose: &Pose<Color, Board>,
+    ) -> Option<BlockNormal<S, 12>> {
+        let mut normal = BlockNormal::ZERO;
+        self.add_view(index, numbers, pose, &mut normal).then_some(normal)
+    }
+}
+
+/// A view and all that its residuals depend on but its pose. Nothing in here depends on the number of parameters when
+/// compiled: there is one copy for each width of vectors.
+struct ReadyView<'a> {
+    ready: Ready<'a>,
+    view: &'a Measured,
+    surface: Surface,
+    surface_numbers: &'a [f64],
+    knots_m: &'a [f64],
+    sheet: &'a Sheet,
+    loss: Loss,
+    /// 1/height of the image.
+    per_row: f64,
+    n_own: usize,
+    n_shared: usize,
+}
+
+impl ReadyView<'_> {
+    /// `None` outside the problem's domain.
+    fn sums(&self, pose: &Pose<Color, Board>) -> Option<ViewSums> {
+        dispatch!(Level::new(), simd => self.sums_of(simd, pose))
+    }
+
+    #[inline(always)]
+    fn sums_of<I: Simd>(&self, simd: I, pose: &Pose<Color, Board>) -> Option<ViewSums> {
+        let Self { ready, view, knots_m, sheet, .. } = self;
+        let m = pose.rotation.matrix();
+        let n_parameters = self.n_own + self.n_shared;
+        let n_camera = self.n_shared - self.surface_numbers.len();
+        let mut sums = Sums::zero(simd, n_parameters);
+        let zero = f64x8::splat(simd, 0.0);
+        let mut cost = zero;
+        let mut by_height = Vec::new();
+        if !knots_m.is_empty() {
+            by_height.reserve(view.corners.len() * (n_parameters + 2));
+        }
+        let nothing = Rows { weight: zero, residual: zero, derivatives: [zero; MAX_PARAMETERS] };
+        let mut rows = [nothing; 2];
         for start in (0..view.corners.len()).step_by(LANES) {
             let n = (view.corners.len() - start).min(LANES);
             let points = &view.points[start..start + n];
@@ -300,19 +334,19 @@ impl<const S: usize> Reprojection<'_, S> {
             let x = gather(simd, points, |p| p.x);
             let y = gather(simd, points, |p| p.y);
             let mut place = [x, y, gather(simd, points, |p| p.z)];
-            let by_surface = self.sheet.by_shared(surface, [x, y]);
-            for (by, number) in by_surface.iter().zip(numbers) {
+            let by_surface = sheet.by_shared(self.surface, [x, y]);
+            for (by, number) in by_surface.iter().zip(self.surface_numbers) {
                 (0..3).for_each(|k| place[k] += by[k] * *number);
             }
             if !knots_m.is_empty() {
-                place[2] += gather(simd, corners, |c| self.sheet.height_m(c.id, knots_m));
+                place[2] += gather(simd, corners, |c| sheet.height_m(c.id, knots_m));
             }
             let turned = rotated(m, place);
             let t = &pose.translation;
             let [tx, ty, tz] = turned;
-            let Some(drawn) = ready.project::<I, S>(simd, [tx + t.x, ty + t.y, tz + t.z]) else {
-                return false;
-            };
+            let mut by_shared =
+                rows.each_mut().map(|row| &mut row.derivatives[self.n_own..n_parameters]);
+            let drawn = ready.project(simd, [tx + t.x, ty + t.y, tz + t.z], &mut by_shared)?;
             let seen = [gather(simd, corners, |c| c.pixel.x), gather(simd, corners, |c| c.pixel.y)];
             let weights = &view.weights[start..start + n];
             let given = f64x8::from_fn(simd, |lane| weights.get(lane).copied().unwrap_or(0.0));
@@ -328,72 +362,39 @@ impl<const S: usize> Reprojection<'_, S> {
                     given * f64x8::from_fn(simd, |lane| loss.weight(square[lane]))
                 }
             };
-            let time = (seen[1] + 0.5) * per_row - 0.5;
-            let nothing = Rows {
-                weight,
-                residual: residual[0],
-                d_shared: drawn.by_shared[0],
-                d_block: [weight; B],
-            };
-            let mut rows = [nothing; 2];
+            let time = (seen[1] + 0.5) * self.per_row - 0.5;
             for (axis, row) in rows.iter_mut().enumerate() {
                 let [a, b, c] = drawn.by_point[axis];
-                row.residual = residual[axis];
-                row.d_shared = drawn.by_shared[axis];
-                for (derivative, by) in row.d_shared[first..].iter_mut().zip(by_surface) {
+                (row.weight, row.residual) = (weight, residual[axis]);
+                let by_pose = [ty * c - tz * b, tz * a - tx * c, tx * b - ty * a, a, b, c];
+                let (own, shared) = row.derivatives.split_at_mut(self.n_own);
+                let (still, moving) = own.split_at_mut(POSE);
+                still.copy_from_slice(&by_pose);
+                moving.iter_mut().zip(by_pose).for_each(|(by, by_pose)| *by = time * by_pose);
+                for (derivative, by) in shared[n_camera..self.n_shared].iter_mut().zip(by_surface) {
                     let [x, y, z] = rotated(m, by);
                     *derivative = a * x + b * y + c * z;
                 }
-                let by_pose = [ty * c - tz * b, tz * a - tx * c, tx * b - ty * a, a, b, c];
-                row.d_block = O::derivatives(by_pose, time);
             }
             sums.add(&rows);
             if !knots_m.is_empty() {
                 let along =
                     |[a, b, c]: [f64x8<I>; 3]| a * m[(0, 2)] + b * m[(1, 2)] + c * m[(2, 2)];
-                let d_loose = [along(drawn.by_point[0]), along(drawn.by_point[1])];
-                let [wa, wb] = [weight * d_loose[0], weight * d_loose[1]];
+                let by_itself = [along(drawn.by_point[0]), along(drawn.by_point[1])];
+                let [wa, wb] = [weight * by_itself[0], weight * by_itself[1]];
                 let [a, b] = &rows;
-                let (mut by_shared, mut by_block) = ([weight; S], [weight; B]);
-                for i in 0..S {
-                    by_shared[i] = wa * a.d_shared[i] + wb * b.d_shared[i];
+                let mut products = [zero; MAX_PARAMETERS + 2];
+                for i in 0..n_parameters {
+                    products[i] = wa * a.derivatives[i] + wb * b.derivatives[i];
                 }
-                for i in 0..B {
-                    by_block[i] = wa * a.d_block[i] + wb * b.d_block[i];
-                }
-                let by_itself = wa * d_loose[0] + wb * d_loose[1];
-                let right = wa * a.residual + wb * b.residual;
-                for (lane, corner) in corners.iter().enumerate() {
-                    normal.push_loose(
-                        corner.id,
-                        (by_shared.map(|by| by[lane]), by_block.map(|by| by[lane])),
-                        (by_itself[lane], right[lane]),
-                    );
+                products[n_parameters] = wa * by_itself[0] + wb * by_itself[1];
+                products[n_parameters + 1] = wa * a.residual + wb * b.residual;
+                for lane in 0..n {
+                    by_height.extend(products[..n_parameters + 2].iter().map(|p| p[lane]));
                 }
             }
         }
-        sums.add_to(normal);
-        normal.add_cost(0.5 * sum(cost));
-        true
-    }
-
-    /// The normal equations of a view that moves while its rows are read: its pose, and by how much it turns and shifts
-    /// from the first row to the last, known beforehand to these σ; `None` outside the problem's domain.
-    pub(super) fn moving_view(
-        &self,
-        index: usize,
-        numbers: (&[f64; S], &[f64]),
-        pose: &Pose<Color, Board>,
-        motion_sigma: [f64; 6],
-    ) -> Option<BlockNormal<S, 12>> {
-        let mut normal = BlockNormal::ZERO;
-        let whole = self.add_view::<Moving, 12>(index, numbers, pose, &mut normal);
-        for (k, sigma) in motion_sigma.into_iter().enumerate() {
-            let mut unit = [0.0; 12];
-            unit[6 + k] = 1.0;
-            normal.add_row(sigma.powi(-2), 0.0, &[0.0; S], &unit);
-        }
-        whole.then_some(normal)
+        Some(ViewSums { totals: sums.total(), half_rho: 0.5 * sum(cost), by_height })
     }
 }
 
@@ -408,7 +409,7 @@ impl<const S: usize> Bordered<S, 6> for Reprojection<'_, S> {
         pose: &Self::Block,
         normal: &mut BlockNormal<S, 6>,
     ) -> bool {
-        self.add_view::<Still, 6>(index, (shared, knots_m), pose, normal)
+        self.add_view(index, (shared, knots_m), pose, normal)
     }
 
     fn shared_precision(&self) -> [f64; S] {
@@ -430,7 +431,7 @@ impl<const S: usize> Bordered<S, 6> for Reprojection<'_, S> {
 #[allow(clippy::needless_range_loop, reason = "rows and columns of a Jacobian read as such")]
 mod tests {
     use super::*;
-    use crate::{calibrate::surface::Surface, geom::Rotation};
+    use crate::geom::Rotation;
 
     #[test]
     fn jacobians_match_differences() {
@@ -461,11 +462,13 @@ mod tests {
     fn one<const S: usize>(ready: &Ready<'_>, point: &Vector3<f64>) -> One<S> {
         dispatch!(Level::new(), simd => {
             let lanes = [point.x, point.y, point.z].map(|c| f64x8::splat(simd, c));
-            let drawn = ready.project::<_, S>(simd, lanes).unwrap();
+            let mut by_shared = [[f64x8::splat(simd, 0.0); S]; 2];
+            let [x, y] = &mut by_shared;
+            let drawn = ready.project(simd, lanes, &mut [x, y]).unwrap();
             (
                 drawn.pixel.map(|p| p[7]),
                 drawn.by_point.map(|row| row.map(|d| d[7])),
-                drawn.by_shared.map(|row| row.map(|d| d[7])),
+                by_shared.map(|row| row.map(|d| d[7])),
             )
         })
     }

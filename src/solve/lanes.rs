@@ -1,4 +1,7 @@
 //! The normal equations of eight residuals at once.
+//!
+//! How many parameters there are is known when running, not when compiling: the sums go through memory in any case, and
+//! one copy of this code serves problems of all sizes.
 
 use fearless_simd::{Simd, f64x8, prelude::*};
 
@@ -7,71 +10,79 @@ use super::BlockNormal;
 /// So many residuals lie side by side.
 pub(crate) const LANES: usize = 8;
 
-/// As [`Row`](super::Row), of eight residuals side by side.
+/// A residual depends on so many parameters at the most, those of its block and the shared ones together.
+pub(crate) const MAX_PARAMETERS: usize = 24;
+
+/// As [`Row`](super::Row), of eight residuals side by side. The derivatives are those by the block's parameters, then
+/// those by the shared ones; what lies behind them does not count.
 #[derive(Clone, Copy)]
-pub(crate) struct Rows<I: Simd, const S: usize, const B: usize> {
+pub(crate) struct Rows<I: Simd> {
     pub(crate) weight: f64x8<I>,
     pub(crate) residual: f64x8<I>,
-    pub(crate) d_shared: [f64x8<I>; S],
-    pub(crate) d_block: [f64x8<I>; B],
+    pub(crate) derivatives: [f64x8<I>; MAX_PARAMETERS],
 }
 
 /// What goes to a [`BlockNormal`] in the end: eight sums of each of its numbers, whose order of addition is the same on
 /// every processor.
-pub(crate) struct Sums<I: Simd, const S: usize, const B: usize> {
-    u: [[f64x8<I>; S]; S],
-    w: [[f64x8<I>; B]; S],
-    v: [[f64x8<I>; B]; B],
-    g: [f64x8<I>; S],
-    h: [f64x8<I>; B],
+pub(crate) struct Sums<I: Simd> {
+    /// The lower triangle, row by row.
+    products: Vec<f64x8<I>>,
+    right: Vec<f64x8<I>>,
 }
 
-impl<I: Simd, const S: usize, const B: usize> Sums<I, S, B> {
+impl<I: Simd> Sums<I> {
+    /// Of so many parameters.
     #[inline(always)]
-    pub(crate) fn zero(simd: I) -> Self {
+    pub(crate) fn zero(simd: I, n: usize) -> Self {
         let zero = f64x8::splat(simd, 0.0);
-        Self { u: [[zero; S]; S], w: [[zero; B]; S], v: [[zero; B]; B], g: [zero; S], h: [zero; B] }
+        Self { products: vec![zero; n * (n + 1) / 2], right: vec![zero; n] }
     }
 
     /// Both coordinates of eight pixels.
     #[inline(always)]
-    pub(crate) fn add(&mut self, [a, b]: &[Rows<I, S, B>; 2]) {
-        for i in 0..B {
-            let (wa, wb) = (a.weight * a.d_block[i], b.weight * b.d_block[i]);
-            for j in 0..=i {
-                self.v[i][j] += wa * a.d_block[j] + wb * b.d_block[j];
+    pub(crate) fn add(&mut self, [a, b]: &[Rows<I>; 2]) {
+        let mut rest = &mut self.products[..];
+        for (i, right) in self.right.iter_mut().enumerate() {
+            let (wa, wb) = (a.weight * a.derivatives[i], b.weight * b.derivatives[i]);
+            let (row, below) = rest.split_at_mut(i + 1);
+            for ((sum, da), db) in row.iter_mut().zip(&a.derivatives).zip(&b.derivatives) {
+                *sum += wa * *da + wb * *db;
             }
-            self.h[i] += wa * a.residual + wb * b.residual;
-        }
-        for i in 0..S {
-            let (wa, wb) = (a.weight * a.d_shared[i], b.weight * b.d_shared[i]);
-            for j in 0..B {
-                self.w[i][j] += wa * a.d_block[j] + wb * b.d_block[j];
-            }
-            for j in 0..=i {
-                self.u[i][j] += wa * a.d_shared[j] + wb * b.d_shared[j];
-            }
-            self.g[i] += wa * a.residual + wb * b.residual;
+            *right += wa * a.residual + wb * b.residual;
+            rest = below;
         }
     }
 
+    /// The sums over all lanes.
     #[inline(always)]
-    pub(crate) fn add_to(&self, normal: &mut BlockNormal<S, B>) {
-        for i in 0..B {
-            for j in 0..=i {
-                normal.v[i][j] += sum(self.v[i][j]);
-            }
-            normal.h[i] += sum(self.h[i]);
+    pub(crate) fn total(&self) -> Totals {
+        Totals {
+            products: self.products.iter().map(|s| sum(*s)).collect(),
+            right: self.right.iter().map(|s| sum(*s)).collect(),
         }
-        for i in 0..S {
-            for j in 0..B {
-                normal.w[i][j] += sum(self.w[i][j]);
-            }
-            for j in 0..=i {
-                normal.u[i][j] += sum(self.u[i][j]);
-            }
-            normal.g[i] += sum(self.g[i]);
+    }
+}
+
+/// What [`Sums`] come to: the lower triangle row by row, and the right-hand side.
+pub(crate) struct Totals {
+    products: Vec<f64>,
+    right: Vec<f64>,
+}
+
+impl Totals {
+    /// Panics where they are not of `S` and `B` parameters.
+    pub(crate) fn add_to<const S: usize, const B: usize>(&self, normal: &mut BlockNormal<S, B>) {
+        assert_eq!(self.right.len(), S + B, "parameters");
+        let mut products = self.products.iter();
+        for (i, row) in normal.v.iter_mut().enumerate() {
+            row[..=i].iter_mut().zip(&mut products).for_each(|(sum, product)| *sum += product);
         }
+        for (i, (by_block, by_shared)) in normal.w.iter_mut().zip(&mut normal.u).enumerate() {
+            let row = by_block.iter_mut().chain(&mut by_shared[..=i]);
+            row.zip(&mut products).for_each(|(sum, product)| *sum += product);
+        }
+        let right = normal.h.iter_mut().chain(&mut normal.g);
+        right.zip(&self.right).for_each(|(sum, product)| *sum += product);
     }
 }
 
