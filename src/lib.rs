@@ -15,6 +15,9 @@
 
 // ── Ground: shapes and numbers ──
 
+// Transcendental functions, the same bits everywhere.
+mod math;
+
 // The same work on one core or all, in narrow vectors or wide ones.
 mod par;
 

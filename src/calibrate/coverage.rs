@@ -4,6 +4,7 @@ use super::{Calibration, Input, views};
 use crate::{
     detect::Corner,
     geom::{Board, Color, Pose},
+    math,
     pose::{View, Weighting},
 };
 
@@ -83,8 +84,8 @@ impl Coverage {
             let flip = if normal.z < 0.0 { -1.0 } else { 1.0 };
             coverage.views.push(Tilt {
                 frame,
-                tilt_deg: normal.z.abs().min(1.0).acos().to_degrees(),
-                nearest_deg: (flip * normal.y).atan2(flip * normal.x).to_degrees(),
+                tilt_deg: math::acos(normal.z.abs().min(1.0)).to_degrees(),
+                nearest_deg: math::atan2(flip * normal.y, flip * normal.x).to_degrees(),
             });
             for corner in corners {
                 let column = cell(corner.pixel.x, width);

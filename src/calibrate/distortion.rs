@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     camera::{Intrinsics, RadialTable, TablePair},
-    par,
+    math, par,
 };
 
 /// Fits every hypothesis; `None` where the views do not determine k1.
@@ -100,7 +100,7 @@ fn radial_shift_px(factory: &Intrinsics, free: &[f64], radial: &[f64]) -> Option
         edge(pinhole.cy, pinhole.height) / pinhole.fy,
     ];
     let straight = brown(radial).undistort(corner)?;
-    let length = |ray: [f64; 2]| (ray[0] * pinhole.fx).hypot(ray[1] * pinhole.fy);
+    let length = |ray: [f64; 2]| math::hypot(ray[0] * pinhole.fx, ray[1] * pinhole.fy);
     Some(length(corner) - length(straight))
 }
 

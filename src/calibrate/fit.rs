@@ -10,6 +10,7 @@ use super::{
 use crate::{
     camera::Intrinsics,
     geom::{Board, Color, Pose},
+    math,
     solve::{
         Arrow, ArrowNormal, BySchur, DenseCholesky, Effort, Loss, Pooled, Reduced, covariance_of,
         larger, minimize, total, units,
@@ -289,7 +290,8 @@ fn shutter<const S: usize>(
             }
             let (by_own, log_determinant) = block.block_gain()?;
             gain += by_own;
-            unlikely += log_determinant + 2.0 * sigma.iter().map(|sigma| sigma.ln()).sum::<f64>();
+            unlikely +=
+                log_determinant + 2.0 * sigma.iter().map(|sigma| math::ln(*sigma)).sum::<f64>();
             cost += 2.0 * block.cost();
             if !block.reduce_into(&mut all) {
                 return None;
@@ -305,7 +307,7 @@ fn shutter<const S: usize>(
         };
         let still = cost / degrees(6)?;
         let left = (cost - gain).max(0.0);
-        unlikely += n_residuals as f64 * left.ln();
+        unlikely += n_residuals as f64 * math::ln(left);
         let share = (left / degrees(12)? / still).sqrt();
         Some((unlikely, Shutter { turn_sigma_rad: sigma[0], share, shift }))
     };

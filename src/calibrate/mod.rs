@@ -92,6 +92,7 @@ use crate::{
     camera::{Camera, Intrinsics, TablePair},
     detect::Corner,
     geom::{Board, Point},
+    math,
     pose::View,
 };
 
@@ -341,7 +342,8 @@ impl BoardSurface {
             |a: &&usize, b: &&usize| self.heights_m[**a].total_cmp(&self.heights_m[**b]);
         let ids: Vec<usize> = (0..self.heights_m.len()).collect();
         let sigma = |id: Option<&usize>| id.map_or(f64::NAN, |id| self.sigmas_m[*id]);
-        let sigma = sigma(ids.iter().max_by(by_height)).hypot(sigma(ids.iter().min_by(by_height)));
+        let sigma =
+            math::hypot(sigma(ids.iter().max_by(by_height)), sigma(ids.iter().min_by(by_height)));
         Estimate { value: self.peak_to_valley_m(), sigma }
     }
 }

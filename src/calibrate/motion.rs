@@ -4,6 +4,7 @@ use super::Calibration;
 use crate::{
     camera::Camera,
     geom::{Board, Color, Pixel, Point, Pose, Vector3},
+    math,
     solve::Response,
 };
 
@@ -207,7 +208,7 @@ impl<'a> Disturbed<'a> {
                 yy += a[1] * c * b[1];
             }
         }
-        let larger = 0.5 * (xx + yy + (xx - yy).hypot(2.0 * xy));
+        let larger = 0.5 * (xx + yy + math::hypot(xx - yy, 2.0 * xy));
         Some(larger.max(0.0).sqrt())
     }
 }

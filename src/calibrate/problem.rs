@@ -14,7 +14,7 @@ use crate::{
     camera::{Brown, Intrinsics, RadialTable},
     detect::Corner,
     geom::{Board, Color, Matrix3, Pixel, Pose, Vector3},
-    pose,
+    math, pose,
     solve::{BlockNormal, Bordered, LANES, Loss, MAX_PARAMETERS, Rows, Sums, Totals, sum},
 };
 
@@ -130,7 +130,7 @@ impl Ready<'_> {
                     let mut by_amplitude = [[0.0; LANES]; 2];
                     for lane in 0..LANES {
                         let [x, y] = Pixel::new(pixel[0][lane], pixel[1][lane]) - whole.center;
-                        let m = whole.magnification_at(x.hypot(y));
+                        let m = whole.magnification_at(math::hypot(x, y));
                         for axis in 0..2 {
                             let [a, b] = j[axis];
                             by_amplitude[axis][lane] = -m * (a[lane] * x + b[lane] * y);
@@ -487,7 +487,7 @@ mod tests {
             let point = turn * board + Vector3::new(0.011, 0.007, 0.3);
             let (pixel, by_point, by_shared) = one::<S>(&problem.ready(&shared), &point);
             let expected = camera.project(crate::geom::Point::from_coords(point)).unwrap();
-            assert!((pixel[0] - expected.x).hypot(pixel[1] - expected.y) < 1e-10);
+            assert!(math::hypot(pixel[0] - expected.x, pixel[1] - expected.y) < 1e-10);
             for k in 0..S {
                 let h = 1e-6 * shared[k].abs().max(0.1);
                 let [low, high] = [-h, h].map(|h| {

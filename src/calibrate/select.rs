@@ -8,6 +8,7 @@ use super::{
     views,
 };
 use crate::{
+    math,
     pose::Weighting,
     solve::{BlockNormal, Bordered, Cholesky, Loss, Reduced},
 };
@@ -128,7 +129,7 @@ fn log_determinant(matrix: &Information) -> f64 {
         if !(pivot > 0.0) {
             return f64::NEG_INFINITY;
         }
-        log += pivot.ln();
+        log += math::ln(pivot);
         for i in j + 1..N {
             let share = l[i][j] / pivot;
             for k in j + 1..=i {

@@ -5,6 +5,7 @@ use crate::{
     board::CharucoBoard,
     camera::Real,
     geom::{Board, Matrix3, Point, Pose, Rotation, Vector3},
+    math,
     solve::{DenseCholesky, Mixture},
 };
 
@@ -21,7 +22,7 @@ const SMOOTH_KNOTS: f64 = 2.0;
 /// form with ν = 3/2.
 pub(crate) fn alike(apart_m: f64, pitch_m: f64) -> f64 {
     let d = 3.0_f64.sqrt() * apart_m / (SMOOTH_KNOTS * pitch_m);
-    (1.0 + d) * (-d).exp()
+    (1.0 + d) * math::exp(-d)
 }
 
 /// How far a print may be stretched and sheared: printers are good to a tenth of a percent.

@@ -6,6 +6,7 @@ use crate::{
     camera::{Camera, Distortion, Intrinsics, RadialTable, TablePair},
     detect::Corner,
     geom::{Board, Color, Pixel, Point, Pose, Rotation, Vector3},
+    math,
 };
 
 pub(super) const FACTORY: Intrinsics =
@@ -28,8 +29,8 @@ impl Random {
 
     /// Normal with unit variance (Box and Muller).
     pub(super) fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * (1.0 - self.uniform(0.0, 1.0)).ln()).sqrt();
-        radius * self.uniform(0.0, std::f64::consts::TAU).cos()
+        let radius = (-2.0 * math::ln(1.0 - self.uniform(0.0, 1.0))).sqrt();
+        radius * math::cos(self.uniform(0.0, std::f64::consts::TAU))
     }
 }
 
@@ -108,7 +109,7 @@ impl Scene {
 
 /// The board's centre at this place (metres), tilted about an axis in the image at `azimuth`, rolled (radians).
 pub(super) fn pose(tilt: f64, azimuth: f64, roll: f64, at: [f64; 3]) -> Pose<Color, Board> {
-    let axis = Vector3::new(azimuth.cos(), azimuth.sin(), 0.0);
+    let axis = Vector3::new(math::cos(azimuth), math::sin(azimuth), 0.0);
     let rotation =
         Rotation::from_scaled_axis(axis * tilt) * Rotation::from_scaled_axis(Vector3::z() * roll);
     let centre = Vector3::new(5.0 * 0.020875, 4.0 * 0.020875, 0.0);

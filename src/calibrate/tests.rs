@@ -10,6 +10,7 @@ use crate::{
     camera::{Brown, Distortion, Intrinsics, TablePair},
     detect::Corner,
     geom::{Board, Color, Pixel, Point, Pose, Rotation, Vector3},
+    math,
     solve::{mean, rms},
 };
 
@@ -97,7 +98,7 @@ fn chooses_the_model() {
             assert!(normalised(found.focal_px(), 531.0).abs() < 4.0, "{found:?}");
             assert_eq!(found.candidates.len(), 5);
             let [a, b] = found.split_half_focal_px.unwrap();
-            assert!((a.value - b.value).abs() < 4.0 * a.sigma.hypot(b.sigma));
+            assert!((a.value - b.value).abs() < 4.0 * math::hypot(a.sigma, b.sigma));
         }
         assert!(n >= 5, "{expected:?} in {n} of 6");
     }
@@ -141,7 +142,7 @@ fn tells_how_distorted_the_stream_is() {
         let pinhole = scene.camera.intrinsics;
         let corner = [(-0.5 - pinhole.cx) / pinhole.fx, (-0.5 - pinhole.cy) / pinhole.fy];
         let straight = lens.undistort(corner).unwrap();
-        531.0 * (corner[0].hypot(corner[1]) - straight[0].hypot(straight[1]))
+        531.0 * (math::hypot(corner[0], corner[1]) - math::hypot(straight[0], straight[1]))
     };
     assert!(normalised(test.corner_shift_px, truth).abs() < 4.0, "{truth} {test:?}");
     assert!(truth > 5.0 && test.corner_shift_px.sigma < 2.0);
@@ -328,8 +329,8 @@ fn finds_the_shape_of_large_boards() {
         let frames: Vec<FrameCorners> = (0..16)
             .map(|frame| {
                 let azimuth = random.uniform(0.0, std::f64::consts::TAU);
-                let tilt =
-                    Vector3::new(azimuth.cos(), azimuth.sin(), 0.0) * random.uniform(0.2, 0.7);
+                let tilt = Vector3::new(math::cos(azimuth), math::sin(azimuth), 0.0)
+                    * random.uniform(0.2, 0.7);
                 let turn = Rotation::from_scaled_axis(tilt);
                 let middle = Vector3::new(0.5 * size[0], 0.5 * size[1], 0.0);
                 let at = [(-0.03, 0.03), (-0.03, 0.03), (0.3, 0.5)]
@@ -362,7 +363,7 @@ fn finds_the_shape_of_large_boards() {
             for (corner, residual) in view.corners.iter().zip(&view.residuals_px) {
                 let point = view.color_from_board * surface.corner(&board, corner.id);
                 let seen = corner.pixel - found.camera.project(point).unwrap();
-                let off = (seen[0] - residual[0]).hypot(seen[1] - residual[1]);
+                let off = math::hypot(seen[0] - residual[0], seen[1] - residual[1]);
                 assert!(off < 0.02, "{text}: {off} px");
             }
         }

@@ -6,6 +6,7 @@ use crate::{
     camera::{Camera, Distortion},
     detect::Corner,
     geom::{Board, Color, Pose, Vector3},
+    math,
     pose::{self, View, Weighting},
 };
 
@@ -131,7 +132,7 @@ fn narrow_spread(board: &CharucoBoard, corners: &[Corner]) -> f64 {
         xy += d[0] * d[1] / n;
         yy += d[1] * d[1] / n;
     }
-    let smaller = 0.5 * (xx + yy - (xx - yy).hypot(2.0 * xy));
+    let smaller = 0.5 * (xx + yy - math::hypot(xx - yy, 2.0 * xy));
     smaller.max(0.0).sqrt()
 }
 
@@ -248,7 +249,7 @@ fn distance_px(a: &[Corner], b: &[Corner], near_px: f64) -> Option<f64> {
 /// The largest angle between the optical axis and the board's normal, degrees.
 pub(super) fn max_tilt_deg<'a>(poses: impl Iterator<Item = &'a Pose<Color, Board>>) -> f64 {
     poses
-        .map(|pose| pose.rotation.matrix()[(2, 2)].abs().min(1.0).acos().to_degrees())
+        .map(|pose| math::acos(pose.rotation.matrix()[(2, 2)].abs().min(1.0)).to_degrees())
         .fold(0.0, f64::max)
 }
 

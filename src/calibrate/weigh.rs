@@ -1,6 +1,7 @@
 //! How much each corner says, and which say something else than all others.
 
 use super::{Outlier, RejectedFrame, Rejection, problem::Measured};
+use crate::math;
 use crate::solve::{median, quantile};
 
 /// The median of |x|² for a 2-D normal with unit variance per coordinate.
@@ -83,7 +84,7 @@ pub(super) fn drop_outliers(
             outliers.push(Outlier {
                 frame: view.frame,
                 id: view.corners[index].id,
-                residual_px: x.hypot(y),
+                residual_px: math::hypot(x, y),
                 residual_sigmas: *sigmas,
             });
         }

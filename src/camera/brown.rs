@@ -1,5 +1,7 @@
 //! Brown-Conrady distortion.
 
+use crate::math;
+
 use std::ops::{Add, Mul, Sub};
 
 /// A number, or several side by side.
@@ -81,7 +83,7 @@ impl Brown {
     /// Found by Newton's method from the solution of the radial part alone. `distort` of the result differs from
     /// `ray` by at most 1e-13·max(1, |ray|): 1e-10 px in any camera of ours.
     pub fn undistort(&self, ray: [f64; 2]) -> Option<[f64; 2]> {
-        let radius = ray[0].hypot(ray[1]);
+        let radius = math::hypot(ray[0], ray[1]);
         if !radius.is_finite() {
             return None;
         }
@@ -93,7 +95,7 @@ impl Brown {
             [ray[0] - d[0], ray[1] - d[1]]
         };
         let mut error = residual(x);
-        let mut size = error[0].hypot(error[1]);
+        let mut size = math::hypot(error[0], error[1]);
         for _ in 0..50 {
             if size <= tolerance {
                 break;
@@ -105,7 +107,7 @@ impl Brown {
             loop {
                 let next = [x[0] + fraction * step[0], x[1] + fraction * step[1]];
                 let next_error = residual(next);
-                let next_size = next_error[0].hypot(next_error[1]);
+                let next_size = math::hypot(next_error[0], next_error[1]);
                 if next_size < size {
                     (x, error, size) = (next, next_error, next_size);
                     break;

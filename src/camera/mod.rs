@@ -182,6 +182,7 @@ impl Camera {
 #[allow(clippy::needless_range_loop, reason = "rows and columns of a Jacobian read as such")]
 mod tests {
     use super::*;
+    use crate::math;
 
     /// Every model with all of its numbers at work.
     fn battery() -> Vec<Camera> {
@@ -224,7 +225,7 @@ mod tests {
             for point in points() {
                 let pixel = camera.project(point).expect("in the domain");
                 let [u, v] = camera.unproject(pixel).expect("in the domain");
-                let error = (u - point.x() / point.z()).hypot(v - point.y() / point.z());
+                let error = math::hypot(u - point.x() / point.z(), v - point.y() / point.z());
                 assert!(error < 1e-12, "{camera:?} {point:?}: {error}");
             }
         }

@@ -2,6 +2,7 @@
 
 use super::Error;
 use crate::geom::Pixel;
+use crate::math;
 
 /// Radial magnification sampled evenly from the distortion centre to the farthest image corner, interpolated
 /// linearly:
@@ -96,7 +97,7 @@ impl RadialTable {
     /// defines it. The image reaches from 0 to `width` and from 0 to `height` in Apple's coordinates.
     pub fn farthest_corner_px(center: Pixel, width: usize, height: usize) -> f64 {
         let reach = |c: f64, size: usize| c.abs().max((size as f64 - c).abs());
-        reach(center.x, width).hypot(reach(center.y, height))
+        math::hypot(reach(center.x, width), reach(center.y, height))
     }
 
     /// Magnification minus one at this distance from the centre, m(r).
@@ -116,7 +117,7 @@ impl RadialTable {
     /// Where the table takes this pixel; `None` outside the valid domain.
     pub fn apply(&self, pixel: Pixel) -> Option<Pixel> {
         let offset = pixel - self.center;
-        let r = offset[0].hypot(offset[1]);
+        let r = math::hypot(offset[0], offset[1]);
         if !r.is_finite() {
             return None;
         }
@@ -142,7 +143,7 @@ impl RadialTable {
     /// Exact: on each piece r·(1 + m(r)) is a parabola, which is solved in closed form.
     pub fn invert(&self, pixel: Pixel) -> Option<Pixel> {
         let offset = pixel - self.center;
-        let (_, _, scale) = self.inverse_on_segment(offset[0].hypot(offset[1]))?;
+        let (_, _, scale) = self.inverse_on_segment(math::hypot(offset[0], offset[1]))?;
         Some(self.moved(offset, scale))
     }
 
@@ -150,7 +151,7 @@ impl RadialTable {
     /// At the samples' radii, where the table has a kink, those of the inner piece.
     pub fn invert_with_jacobian(&self, pixel: Pixel) -> Option<(Pixel, [[f64; 2]; 2])> {
         let offset = pixel - self.center;
-        let mapped = offset[0].hypot(offset[1]);
+        let mapped = math::hypot(offset[0], offset[1]);
         let (segment, r, scale) = self.inverse_on_segment(mapped)?;
         // Along the radius dr/dmapped = 1/(r·(1 + m))', across it r/mapped.
         let along = 1.0 / segment.derivative(r);
@@ -201,7 +202,7 @@ impl RadialTable {
     pub fn d_applied_d_pixel(&self, pixel: Pixel) -> Option<[[f64; 2]; 2]> {
         self.apply(pixel)?;
         let [x, y] = pixel - self.center;
-        let r = x.hypot(y);
+        let r = math::hypot(x, y);
         let segment = self.segments().find(|segment| r <= segment.end)?;
         let magnification = 1.0 + segment.offset + segment.slope * r;
         // d m/d p = slope·(p − c)/r

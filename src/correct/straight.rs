@@ -9,6 +9,7 @@ use crate::{
     camera::{Camera, Distortion, TablePair},
     detect::Observation,
     geom::Pixel,
+    math,
     recording::StreamState,
     solve::{mean, standard_error},
 };
@@ -153,8 +154,8 @@ fn fitted(points: Vec<Pixel>) -> BoardLine {
         [a + x * x, b + x * y, c + y * y]
     });
     // The direction of the larger eigenvalue of the scatter.
-    let angle = 0.5 * (2.0 * xy).atan2(xx - yy);
-    let (dx, dy) = (angle.cos(), angle.sin());
+    let angle = 0.5 * math::atan2(2.0 * xy, xx - yy);
+    let (dx, dy) = (math::cos(angle), math::sin(angle));
     let foot = |p: &Pixel| {
         let along = (p.x - cx) * dx + (p.y - cy) * dy;
         Pixel::new(cx + along * dx, cy + along * dy)
@@ -220,7 +221,7 @@ impl Straightness {
             let ratios: Vec<f64> = self
                 .frames
                 .iter()
-                .map(|&(s, n)| (square(s[j], n) / square(s[i], n)).ln())
+                .map(|&(s, n)| math::ln(square(s[j], n) / square(s[i], n)))
                 .collect();
             mean(&ratios) > 3.0 * standard_error(&ratios)
         };

@@ -2,6 +2,7 @@
 
 use nalgebra::{Cholesky, Matrix3, SMatrix, SVector, Vector3};
 
+use crate::math;
 use crate::solve::{Pooled, Reduced, larger, median};
 
 /// The unknowns: the plane by which the board's surface is not where its corners say (height of its middle, slopes
@@ -102,7 +103,7 @@ pub(super) fn between_frames<const M: usize>(
     let tried: Vec<(f64, Weighed<M>)> = (-16..=16)
         .filter_map(|i| {
             let decades = f64::from(i) / 4.0;
-            let weighed = weigh(planes, gains, (theta, prior), (10f64.powf(decades), least))?;
+            let weighed = weigh(planes, gains, (theta, prior), (math::pow(10f64, decades), least))?;
             let unlikely = 0.5 * (decades / RATIO_DECADES).powi(2);
             Some((weighed.likelihood - unlikely, weighed))
         })
@@ -110,7 +111,7 @@ pub(super) fn between_frames<const M: usize>(
     let most = tried.iter().map(|(ln, _)| *ln).fold(f64::NEG_INFINITY, f64::max);
     let likely: Vec<(f64, &Weighed<M>)> = tried
         .iter()
-        .map(|(ln, weighed)| ((ln - most).exp(), weighed))
+        .map(|(ln, weighed)| (math::exp(ln - most), weighed))
         .filter(|(share, _)| *share > LEAST_SHARE)
         .collect();
     let whole: f64 = likely.iter().map(|(share, _)| share).sum();
@@ -189,7 +190,7 @@ fn weigh<const M: usize>(
         .map(|(plane, gain)| {
             let covariance = plane.pose + plane.sensor * ratio;
             let inverse = covariance.try_inverse()?;
-            determinants += covariance.determinant().ln();
+            determinants += math::ln(covariance.determinant());
             let weighted = gain.transpose() * inverse;
             Some(Said { inverse, information: weighted * gain, score: weighted * plane.beta })
         })
@@ -243,7 +244,7 @@ fn weigh<const M: usize>(
     // Frames that count less, or not at all, are not for nothing: the loss is the sum of weighted squares and what lies
     // beyond.
     let likelihood = -0.5
-        * (determinants + n_numbers * variance.ln() + beyond + ln_scaled - n_found
+        * (determinants + n_numbers * math::ln(variance) + beyond + ln_scaled - n_found
             + off.dot(&(prior.precision * off)));
     let said = said.into_iter().zip(robust).map(|(said, w)| (said, w / variance)).collect();
     Some(Weighed { delta, information, said, likelihood })

@@ -12,7 +12,7 @@ use crate::{
     board::{CharucoBoard, Layout},
     calibrate::Estimate,
     geom::Pixel,
-    par,
+    math, par,
     solve::mad_sigma,
 };
 
@@ -144,7 +144,7 @@ impl Print {
     }
 
     fn level(&self, sigma_m: f64) -> &[f32] {
-        let nearness = |(each, _): &&(f64, Vec<f32>)| (each / sigma_m).ln().abs();
+        let nearness = |(each, _): &&(f64, Vec<f32>)| math::ln(each / sigma_m).abs();
         let best = self.levels.iter().min_by(|a, b| nearness(a).total_cmp(&nearness(b)));
         best.map_or(&[], |(_, level)| level)
     }
@@ -154,7 +154,7 @@ impl Print {
 fn blur(raster: &mut Vec<f32>, (columns, rows): (usize, usize), sigma: f64) {
     let radius = (3.0 * sigma).ceil() as usize;
     let mut weights: Vec<f32> = (0..=2 * radius)
-        .map(|i| (-0.5 * ((i as f64 - radius as f64) / sigma).powi(2)).exp() as f32)
+        .map(|i| math::exp(-0.5 * ((i as f64 - radius as f64) / sigma).powi(2)) as f32)
         .collect();
     let sum: f32 = weights.iter().sum();
     weights.iter_mut().for_each(|w| *w /= sum);
@@ -211,7 +211,7 @@ impl Normal {
             .flatten()
             .map(|s| s.by_pixel.determinant().abs().sqrt())
             .fold((0.0, 0), |(sum, n), scale| (sum + scale, n + 1));
-        let blur_px = SENSOR_BLUR_PX.hypot(texture.cell_px as f64 / 12.0_f64.sqrt());
+        let blur_px = math::hypot(SENSOR_BLUR_PX, texture.cell_px as f64 / 12.0_f64.sqrt());
         let level = print.level(blur_px * scale / f64::from(n_spots.max(1)));
         // Darkness and its derivatives, as depth: what is measured too far by d has an inverse depth less by d/z².
         let seen: Vec<Option<[f64; 5]>> = (0..n)
@@ -446,7 +446,7 @@ fn place_of<const M: usize>(numbers: &SVector<f64, M>) -> Vector4<f64> {
 /// The longest of a step's parts, of those given.
 fn longest(step: &Vector4<f64>, parts: &[f64; 3]) -> f64 {
     let [zoom, shift_px, lens] = parts;
-    (step.x / zoom).abs().max(step.y.hypot(step.z) / shift_px).max((step.w / lens).abs())
+    (step.x / zoom).abs().max(math::hypot(step.y, step.z) / shift_px).max((step.w / lens).abs())
 }
 
 /// Finds contrast and place, starting from a place that is right within half a square. `look` tells where a pixel of

@@ -19,7 +19,7 @@ use crate::{
     camera::Camera,
     detect::Corner,
     geom::Pixel,
-    par,
+    math, par,
     pose::View,
     solve::mad_sigma,
 };
@@ -391,7 +391,7 @@ impl Scene<'_> {
         let ray = Vector3::new(ray[0], ray[1], 1.0);
         let cos_incidence = (stance.plane.dot(&ray) / (stance.plane.norm() * ray.norm())).abs();
         let far_enough = self.board_depth(stance, [ray.x, ray.y]).is_some_and(|m| m >= NEAR_M);
-        far_enough && cos_incidence >= MAX_INCIDENCE_DEG.to_radians().cos()
+        far_enough && cos_incidence >= math::cos(MAX_INCIDENCE_DEG.to_radians())
     }
 
     fn sights<'p>(
@@ -501,7 +501,7 @@ impl Scene<'_> {
 
 /// σ of a patch, up to a factor that does not matter.
 fn noise_m(board_m: f64) -> f64 {
-    NOISE_FLOOR_M.hypot(board_m * board_m * NOISE_GROWTH_PER_M)
+    math::hypot(NOISE_FLOOR_M, board_m * board_m * NOISE_GROWTH_PER_M)
 }
 
 /// Adds what the camera's own covariance does.

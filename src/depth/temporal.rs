@@ -10,6 +10,7 @@ use crate::{
     detect::Corner,
     geom::Pixel,
     image::DepthMap,
+    math,
     solve::{mad_sigma, mean, median, standard_error},
 };
 
@@ -170,7 +171,7 @@ fn motion_px(before: &[Corner], after: &[Corner]) -> Option<f64> {
         .iter()
         .filter_map(|corner| {
             let Pixel { x, y } = after.iter().find(|other| other.id == corner.id)?.pixel;
-            Some((x - corner.pixel.x).hypot(y - corner.pixel.y))
+            Some(math::hypot(x - corner.pixel.x, y - corner.pixel.y))
         })
         .collect();
     (moved.len() >= 6).then(|| median(&moved))

@@ -12,6 +12,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::math;
 use crate::par::vectorized;
 
 /// Reach of the blur's kernel, bits to each side.
@@ -247,7 +248,7 @@ impl BlurFit {
             return f64::NEG_INFINITY;
         };
         let residual = (self.energy - explained).max(1e-6 * self.energy);
-        -(residual / self.n_samples).ln()
+        -math::ln(residual / self.n_samples)
     }
 }
 

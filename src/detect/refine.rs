@@ -17,7 +17,7 @@
 
 use fearless_simd::{Level as Processor, Simd, dispatch};
 
-use crate::{geom::Pixel, image::Gray, par::vectorized};
+use crate::{geom::Pixel, image::Gray, math, par::vectorized};
 
 use super::{
     map::length,
@@ -151,10 +151,14 @@ pub(super) fn refine(scales: &mut Scales<'_>, guess: &Guess, reach_px: f64) -> O
     let blur_sigma = BLUR_SIGMA * (widest - SHARP).max(0.0);
     let rim_px = guess.rim * across[0].min(across[1]);
     let wanting = widest / 2.0 + MIN_WIDTH - rim_px;
-    let marker_sigma = MARKER_SIGMA * ((wanting + wanting.hypot(MARKER_ONSET)) / 2.0).powi(2);
+    let marker_sigma =
+        MARKER_SIGMA * ((wanting + math::hypot(wanting, MARKER_ONSET)) / 2.0).powi(2);
     Some(Refined {
         pixel: Pixel::new(found.pixel.x * f + offset, found.pixel.y * f + offset),
-        sigma_px: (found.sigma_px * noise * f).hypot(floor).hypot(blur_sigma).hypot(marker_sigma),
+        sigma_px: math::hypot(
+            math::hypot(math::hypot(found.sigma_px * noise * f, floor), blur_sigma),
+            marker_sigma,
+        ),
     })
 }
 

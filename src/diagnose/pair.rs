@@ -13,6 +13,7 @@
 use super::{
     Api, Finding, KnownIssue, Registry, Sheet, td205_factory_changed, td502_reference_dimensions,
 };
+use crate::math;
 use crate::recording::Defect;
 
 /// One side of a comparison.
@@ -139,7 +140,7 @@ pub fn compare(first: Side, second: Side) -> Comparison {
 
 /// Two recordings of one unit share the principal point at the reference dimensions; no two units of the paper do.
 fn is_same_unit(a: &Sheet, b: &Sheet) -> bool {
-    let near = |[x, y]: [f64; 2], [u, v]: [f64; 2]| (x - u).hypot(y - v) < UNCHANGED_PX;
+    let near = |[x, y]: [f64; 2], [u, v]: [f64; 2]| math::hypot(x - u, y - v) < UNCHANGED_PX;
     let centers = match (a.distortion_center, b.distortion_center) {
         (Some(a), Some(b)) => near(a, b),
         _ => true,

@@ -2,6 +2,7 @@
 
 use super::{Case, Code, Evidence, Finding, Unit, Verdict};
 use crate::{
+    math,
     recording::Defect,
     solve::{mad_sigma, median},
 };
@@ -18,7 +19,7 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
         .iter()
         .flat_map(|d| &d.frames)
         .flat_map(|f| &f.samples)
-        .map(|s| (s.sensor_m / s.board_m).ln())
+        .map(|s| math::ln(s.sensor_m / s.board_m))
         .filter(|ln| ln.is_finite())
         .collect();
     if ratios.len() < LEAST_SAMPLES {
@@ -28,7 +29,7 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
         return finding;
     }
     let middle = median(&ratios);
-    let ratio = middle.exp();
+    let ratio = math::exp(middle);
     finding.value = Some(ratio);
     finding.evidence = vec![
         Evidence::number("sensor_over_board", ratio),
@@ -43,8 +44,8 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
         return finding;
     }
     finding.verdict = Verdict::Fault;
-    let power = ratio.log10().round();
-    let unit = 10f64.powf(power);
+    let power = math::log10(ratio).round();
+    let unit = math::pow(10f64, power);
     finding.summary = format!(
         "Depth is in the wrong unit: on the board the sensor says {ratio:.3} times the board's depth (median of {} \
          samples; no camera is wrong by a factor of {FAR_OFF:.0}).",

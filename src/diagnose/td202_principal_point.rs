@@ -4,6 +4,7 @@ use super::{Case, Code, Evidence, Finding, Unit, Verdict, td503_intrinsics_size}
 use crate::{
     calibrate::{Estimate, Lens},
     camera::Intrinsics,
+    math,
     recording::{Defect, StreamState},
 };
 
@@ -56,11 +57,11 @@ pub(super) fn check(case: &Case<'_>, state: StreamState) -> Finding {
     let off = [0, 1].map(|i| Estimate { value: own[i].value - factory[i], sigma: own[i].sigma });
     // The worse of both axes: a fault in one is a fault, and ok must mean both.
     finding.verdict = Verdict::of(off[0], tolerance_px).min(Verdict::of(off[1], tolerance_px));
-    let length_px = off[0].value.hypot(off[1].value);
+    let length_px = math::hypot(off[0].value, off[1].value);
     finding.value = Some(length_px);
     // Along its own direction, both axes taken as independent.
     let share = |i: usize| if length_px > 0.0 { off[i].value / length_px } else { 0.5f64.sqrt() };
-    finding.sigma = Some((share(0) * off[0].sigma).hypot(share(1) * off[1].sigma));
+    finding.sigma = Some(math::hypot(share(0) * off[0].sigma, share(1) * off[1].sigma));
     finding.evidence = vec![
         Evidence::estimate("center_x_px", own[0]),
         Evidence::estimate("center_y_px", own[1]),

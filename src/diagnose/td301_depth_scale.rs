@@ -1,7 +1,7 @@
 #![doc = include_str!("td301_depth_scale.md")]
 
 use super::{Case, Code, Evidence, Finding, Unit, Verdict, td201_focal_length::Measured};
-use crate::{calibrate::Estimate, depth::Registration, recording::Defect};
+use crate::{calibrate::Estimate, depth::Registration, math, recording::Defect};
 
 /// What to record for a line of depth over distance.
 pub(super) const RECORD: &str = "Record the board at several distances (0.2 m to 0.5 m), 20 or more frames, tilted in \
@@ -28,11 +28,11 @@ impl Scaled {
         Self {
             slope: Estimate {
                 value: found.scale.value - 1.0,
-                sigma: found.scale.sigma.hypot(common),
+                sigma: math::hypot(found.scale.sigma, common),
             },
             errors_m: distances_m.map(|distance_m| {
                 let Estimate { value, sigma } = found.error_at_m(distance_m);
-                Estimate { value, sigma: sigma.hypot(common * distance_m) }
+                Estimate { value, sigma: math::hypot(sigma, common * distance_m) }
             }),
             distances_m,
         }

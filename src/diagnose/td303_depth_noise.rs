@@ -2,6 +2,7 @@
 
 use super::{Case, Code, Evidence, Finding, Unit, Verdict};
 use crate::depth::{STILL_PX, TemporalNoise};
+use crate::math;
 
 /// Share of holes within the sensor's reach beyond which a recording is short of depth, percent.
 const MANY_HOLES_PERCENT: f64 = 10.0;
@@ -27,7 +28,7 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
         return finding;
     };
     let pattern = &found.pattern;
-    let expected_m = FLOOR_M.hypot(found.center_m * found.center_m * GROWTH_PER_M);
+    let expected_m = math::hypot(FLOOR_M, found.center_m * found.center_m * GROWTH_PER_M);
     let times = pattern.pixel_noise_m / expected_m;
     let holes = &pattern.holes;
     let in_reach = holes.n_pixels_in_reach as f64 / holes.n_pixels.max(1) as f64;

@@ -6,7 +6,7 @@ use super::{
     td301_depth_scale::basis,
     td401_zoom::{RECORD, by_what, witnesses},
 };
-use crate::{calibrate::Estimate, recording::Defect};
+use crate::{calibrate::Estimate, math, recording::Defect};
 
 pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
     let mut finding = Finding::new(Code::TD402, Unit::Px);
@@ -24,7 +24,7 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
     let [x, y] = found.shift_px;
     // The worse of both axes: a fault in one is a fault, and ok must mean both.
     finding.verdict = Verdict::of(x, tolerance_px).min(Verdict::of(y, tolerance_px));
-    let length_px = x.value.hypot(y.value);
+    let length_px = math::hypot(x.value, y.value);
     finding.value = Some(length_px);
     finding.sigma = Some(sigma_along(&found.covariance, [x, y]));
     finding.evidence = vec![
@@ -69,7 +69,7 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
 
 /// Standard deviation of the shift along itself, pixels.
 fn sigma_along(covariance: &[[f64; 5]; 5], [x, y]: [Estimate; 2]) -> f64 {
-    let length = x.value.hypot(y.value);
+    let length = math::hypot(x.value, y.value);
     if !(length > 0.0) {
         return x.sigma.max(y.sigma);
     }

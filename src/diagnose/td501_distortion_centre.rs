@@ -1,5 +1,7 @@
 #![doc = include_str!("td501_distortion_centre.md")]
 
+use crate::math;
+
 use super::{Case, Code, Evidence, Finding, Unit, Verdict};
 
 /// Both are given to a hundredth of a pixel at best; nearer than that they are one place.
@@ -16,7 +18,7 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
         return finding;
     };
     let (dx, dy) = (center.x - intrinsics.cx, center.y - intrinsics.cy);
-    let distance_px = dx.hypot(dy);
+    let distance_px = math::hypot(dx, dy);
     finding.value = Some(distance_px);
     finding.evidence = vec![
         Evidence::number("center_minus_principal_x_px", dx),

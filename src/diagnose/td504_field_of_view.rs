@@ -1,5 +1,7 @@
 #![doc = include_str!("td504_field_of_view.md")]
 
+use crate::math;
+
 use super::{Case, Code, Evidence, Finding, Unit, Verdict};
 
 /// Horizontal fields of view that front and rear cameras with depth have, with a margin, degrees: from the 51° of
@@ -16,7 +18,7 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
         return finding;
     };
     let k = factory.intrinsics;
-    let angle_deg = (2.0 * (k.width as f64 / (2.0 * k.fx)).atan()).to_degrees();
+    let angle_deg = (2.0 * math::atan(k.width as f64 / (2.0 * k.fx))).to_degrees();
     finding.value = Some(angle_deg);
     finding.evidence = vec![Evidence::number("factory_focal_px", k.focal_px())];
     let [least, most] = PLAUSIBLE_DEG;

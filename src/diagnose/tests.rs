@@ -13,6 +13,7 @@ use crate::{
     },
     detect::{Corner, Identity, Observation},
     geom::{Board, Color, Pixel, Pose, Rotation, Vector3},
+    math,
     pose::{View, Weighting},
     recording::{Defect, Factory, Problem, StreamState},
 };
@@ -421,7 +422,7 @@ fn a_shifted_depth_map_is_one_fault_and_no_other() {
         panic!("{finding:?}")
     };
     let sigma = finding.sigma.unwrap();
-    assert!((x - 3.0).hypot(y + 2.0) < 4.0 * sigma && sigma < 0.3, "{finding:?}");
+    assert!(math::hypot(x - 3.0, y + 2.0) < 4.0 * sigma && sigma < 0.3, "{finding:?}");
 }
 
 #[test]

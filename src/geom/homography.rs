@@ -1,5 +1,7 @@
 //! Plane-to-plane projective maps.
 
+use crate::math;
+
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
 use super::Pixel;
@@ -103,7 +105,7 @@ fn normalised(points: &[Pixel]) -> Option<(Vec<Pixel>, Matrix3<f64>)> {
     let n = points.len() as f64;
     let cx = points.iter().map(|p| p.x).sum::<f64>() / n;
     let cy = points.iter().map(|p| p.y).sum::<f64>() / n;
-    let spread = points.iter().map(|p| (p.x - cx).hypot(p.y - cy)).sum::<f64>() / n;
+    let spread = points.iter().map(|p| math::hypot(p.x - cx, p.y - cy)).sum::<f64>() / n;
     if !(spread > 1e-12) {
         return None;
     }

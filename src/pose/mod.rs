@@ -36,6 +36,7 @@ use crate::{
     camera::Camera,
     detect::Corner,
     geom::{Board, Color, Point, Pose, Vector3},
+    math,
 };
 
 /// The board seen in one frame.
@@ -194,7 +195,7 @@ impl View {
     /// The angle between the optical axis and the board's normal, radians: 0 for a view straight on.
     pub fn tilt_rad(&self) -> f64 {
         let normal = self.color_from_board.rotation * Vector3::z();
-        normal.z.abs().min(1.0).acos()
+        math::acos(normal.z.abs().min(1.0))
     }
 }
 

@@ -4,6 +4,7 @@ use nalgebra::{Matrix2, Matrix3, Matrix3x2, SMatrix, SVector, Vector2, Vector3};
 
 use crate::{
     geom::{Board, Color, Pixel, Point, Pose, Rotation},
+    math,
     solve::Cholesky,
 };
 
@@ -51,7 +52,8 @@ pub(super) fn both_poses(
     let m = a.try_inverse()? * j;
     // The larger singular value of m: √ of the larger eigenvalue of m·mᵀ.
     let mm = m * m.transpose();
-    let gamma = (0.5 * (mm.trace() + (mm[(0, 0)] - mm[(1, 1)]).hypot(2.0 * mm[(0, 1)]))).sqrt();
+    let gamma =
+        (0.5 * (mm.trace() + math::hypot(mm[(0, 0)] - mm[(1, 1)], 2.0 * mm[(0, 1)]))).sqrt();
     if !(gamma > 0.0 && gamma.is_finite()) {
         return None;
     }

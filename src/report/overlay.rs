@@ -8,6 +8,7 @@ use crate::{
     detect::Observation,
     geom::{Homography, Pixel},
     image::Rgb,
+    math,
 };
 
 /// What there is to draw over one image, in pixels of that image (integers are pixel centres).
@@ -103,7 +104,7 @@ impl Overlay {
             let [from, to] = segment.map(large);
             // Up to the rings, so that the corner itself stays visible in them.
             let [dx, dy] = to - from;
-            let length = dx.hypot(dy);
+            let length = math::hypot(dx, dy);
             if length > 2.0 * radius {
                 let (x, y) = (dx * radius / length, dy * radius / length);
                 let ends = (Pixel::new(from.x + x, from.y + y), Pixel::new(to.x - x, to.y - y));
@@ -269,7 +270,7 @@ impl Canvas {
         let distance = move |p: Pixel| {
             let [px, py] = p - a;
             let along = ((px * dx + py * dy) / length2).clamp(0.0, 1.0);
-            (px - along * dx).hypot(py - along * dy)
+            math::hypot(px - along * dx, py - along * dy)
         };
         let reach = width / 2.0;
         let low = Pixel::new(a.x.min(b.x) - reach, a.y.min(b.y) - reach);

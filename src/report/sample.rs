@@ -20,6 +20,7 @@ use crate::{
     diagnose::{Code, Device, Evidence, Finding, Sensor, Unit, Verdict},
     geom::{Board, Color, Pixel, Pose, Rotation, Vector3},
     image::{DepthMap, Rgb},
+    math,
     pose::View,
     recording::{Defect, Factory, Limits, Memory, Problem, Recording, StreamState, Writer},
 };
@@ -189,10 +190,11 @@ fn wobble(i: usize) -> f64 {
 fn frame_audit(frame: usize, board: &CharucoBoard) -> FrameAudit {
     let at = frame as f64;
     let own = Camera { intrinsics: intrinsics(OWN_FOCAL_PX), distortion: Distortion::None };
-    let tilt = Vector3::new(0.32 * (1.7 * at).sin(), 0.35 * (2.3 * at).cos(), 0.05 * at);
+    let tilt = Vector3::new(0.32 * math::sin(1.7 * at), 0.35 * math::cos(2.3 * at), 0.05 * at);
     let rotation = Rotation::from_scaled_axis(tilt);
     let center = rotation * Vector3::new(0.104, 0.083, 0.0);
-    let place = Vector3::new(0.02 * (0.9 * at).sin(), 0.015 * (1.3 * at).cos(), 0.24 + 0.015 * at);
+    let place =
+        Vector3::new(0.02 * math::sin(0.9 * at), 0.015 * math::cos(1.3 * at), 0.24 + 0.015 * at);
     let color_from_board: Pose<Color, Board> = Pose::new(rotation, place - center);
     let mut corners = Vec::new();
     let mut residuals_px = Vec::new();

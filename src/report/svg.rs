@@ -1,5 +1,7 @@
 //! What all figures share: numbers as text, scales, axes.
 
+use crate::math;
+
 use maud::{Markup, html};
 
 /// Width of every figure in its own units. The page shows two beside each other on a desk and one on a phone, so the
@@ -75,7 +77,7 @@ impl Ticks {
         // A hair of slack, so that 0.3 counts as a multiple of 0.1.
         let first = (low / step - 1e-9).ceil() as i64;
         let last = (high / step + 1e-9).floor() as i64;
-        let decimals = (-step.log10() - 1e-9).ceil().max(0.0) as usize;
+        let decimals = (-math::log10(step) - 1e-9).ceil().max(0.0) as usize;
         Self { values: (first..=last).map(|i| i as f64 * step).collect(), decimals }
     }
 
@@ -90,7 +92,7 @@ pub(super) fn round_step(step: f64) -> f64 {
     if !(step.is_finite() && step > 0.0) {
         return 1.0;
     }
-    let power = 10f64.powf(step.log10().floor());
+    let power = math::pow(10f64, math::log10(step).floor());
     let factor = [1.0, 2.0, 5.0].into_iter().find(|f| f * power >= step * (1.0 - 1e-9));
     factor.unwrap_or(10.0) * power
 }

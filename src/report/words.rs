@@ -6,6 +6,7 @@ use crate::{
     calibrate::{Estimate, Model},
     depth::BoardDepth,
     diagnose::{Code, Finding, Sensor, Unit, Verdict},
+    math,
     recording::StreamState,
 };
 
@@ -483,7 +484,7 @@ pub(super) fn value_and_sigma(estimate: Estimate, max_decimals: usize) -> String
     }
     let decimals = decimals_of_sigma(sigma).min(max_decimals);
     // A σ below the last digit shown is not zero: say that it is smaller.
-    let smallest = 10f64.powi(-(decimals as i32));
+    let smallest = math::pow(10.0, -(decimals as f64));
     let sigma = if sigma < 0.5 * smallest {
         format!("< {smallest:.decimals$}")
     } else {
@@ -526,7 +527,7 @@ pub(super) fn unbroken(text: &str) -> String {
 /// Digits after the point that show two digits of a σ.
 fn decimals_of_sigma(sigma: f64) -> usize {
     // 0.0995 rounds to 0.10 and 9.95 to 10: the exponent is that of the rounded σ.
-    let exponent = (sigma * 1.005).log10().floor();
+    let exponent = math::log10(sigma * 1.005).floor();
     (1.0 - exponent).max(0.0) as usize
 }
 

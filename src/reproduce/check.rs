@@ -1,6 +1,6 @@
 //! A printed number beside ours.
 
-use crate::calibrate::Estimate;
+use crate::{calibrate::Estimate, math};
 
 /// What the comparison says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -55,7 +55,7 @@ pub struct Check {
 
 /// Half a unit of the last digit, and a hair for the binary representation.
 fn rounding(printed: Printed) -> f64 {
-    0.5 * 10f64.powi(-(printed.decimals as i32)) + 1e-9
+    0.5 * math::pow(10.0, -(printed.decimals as f64)) + 1e-9
 }
 
 impl Check {

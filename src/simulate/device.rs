@@ -3,6 +3,7 @@
 use crate::{
     camera::{Intrinsics, RadialTable, TablePair},
     geom::Pixel,
+    math,
     recording::{Factory, StreamState},
 };
 
@@ -183,7 +184,7 @@ impl Device {
     pub(super) fn factory(&self, rectified: bool) -> Factory {
         let intrinsics = self.factory_intrinsics();
         let tables = self.tables();
-        let half_angle_rad = (Self::WIDTH as f64 / 2.0 / intrinsics.fx).atan();
+        let half_angle_rad = math::atan(Self::WIDTH as f64 / 2.0 / intrinsics.fx);
         Factory {
             intrinsics,
             reference_dimensions: Some(self.reference.map(|n| n as f64)),

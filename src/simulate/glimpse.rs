@@ -11,6 +11,7 @@ use crate::{
     detect::{Corner, Identity, Observation},
     geom::Pixel,
     image::DepthMap,
+    math,
 };
 
 /// What is known of a frame once it was looked at.
@@ -45,7 +46,7 @@ impl Plan {
     /// The scene of one frame with the noise of another.
     fn glimpse_of(&self, frame: usize, noise: usize) -> Glimpse {
         let scene = self.scene(frame);
-        let sigma_px = SHARP_PX.hypot(PER_MOTION * motion_px(&scene));
+        let sigma_px = math::hypot(SHARP_PX, PER_MOTION * motion_px(&scene));
         let mut random = Random::new(self.seed, Subject::Corners, noise);
         let [width, height] =
             [scene.camera.intrinsics.width, scene.camera.intrinsics.height].map(|n| n as f64);

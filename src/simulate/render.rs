@@ -8,7 +8,7 @@ use super::{
 use crate::{
     geom::{Pixel, Point},
     image::{Gray, Rgb},
-    par,
+    math, par,
 };
 
 /// An image and what is true of it.
@@ -225,7 +225,7 @@ impl Flow {
                 displacement(Pixel::new(at(i % columns), at(i / columns))).unwrap_or([0.0; 2])
             })
             .collect();
-        let longest_px = knots.iter().map(|[x, y]| x.hypot(*y)).fold(0.0, f64::max);
+        let longest_px = knots.iter().map(|[x, y]| math::hypot(*x, *y)).fold(0.0, f64::max);
         Self { columns, knots, longest_px }
     }
 
@@ -286,7 +286,7 @@ fn moved(sharp: &Plane, flow: &Flow) -> Plane {
 fn blurred(plane: &Plane, sigma_px: f64) -> Plane {
     let radius = (3.5 * sigma_px).ceil() as usize;
     let weights: Vec<f64> = (0..=2 * radius)
-        .map(|i| (-0.5 * ((i as f64 - radius as f64) / sigma_px).powi(2)).exp())
+        .map(|i| math::exp(-0.5 * ((i as f64 - radius as f64) / sigma_px).powi(2)))
         .collect();
     let total: f64 = weights.iter().sum();
     let weights: Vec<f32> = weights.iter().map(|w| (w / total) as f32).collect();
@@ -385,7 +385,7 @@ impl ToneTable {
 
 /// IEC 61966-2-1.
 fn srgb_from_linear(light: f64) -> f64 {
-    if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 }
+    if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * math::pow(light, 1.0 / 2.4) - 0.055 }
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use crate::{
     board::{CharucoBoard, Layout},
     camera::Camera,
     geom::{Board, Color, Pixel, Point, Pose, Vector3},
+    math,
 };
 
 /// A printed board on a wall, the camera that looks at it, and the light.
@@ -333,7 +334,7 @@ impl<'a> Sight<'a> {
             .corners()
             .iter()
             .filter_map(|corner| self.scene.camera.unproject(corner.pixel))
-            .map(|[u, v]| 3.0 * a.hypot(b) / ((a * u + b * v + c).abs() * focal_px))
+            .map(|[u, v]| 3.0 * math::hypot(a, b) / ((a * u + b * v + c).abs() * focal_px))
             .fold(0.0, f64::max)
     }
 }

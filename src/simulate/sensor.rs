@@ -5,7 +5,7 @@ use super::{
     random::{Random, Subject},
     scene::{Scene, Seen, Sight},
 };
-use crate::{geom::Pixel, image::DepthMap};
+use crate::{geom::Pixel, image::DepthMap, math};
 
 /// A structured-light depth sensor, registered to the colour camera.
 ///
@@ -119,7 +119,7 @@ pub(super) fn measure_frame(
     let ragged = Smooth::new(9.0, width, height, &mut random);
     let blobs = blobs(sensor, width, height, &mut random);
     let sight = Sight::new(scene);
-    let min_cos = sensor.max_incidence_rad.cos();
+    let min_cos = math::cos(sensor.max_incidence_rad);
     let [left, right, top, bottom] = sensor.border_px;
     let seen_at = |x: usize, y: usize| {
         if x < left || x + right >= width || y < top || y + bottom >= height {
@@ -201,7 +201,7 @@ fn gaussian(sigma_px: f64) -> Vec<f32> {
     let radius = (3.0 * sigma_px).ceil() as usize;
     (0..=2 * radius)
         .map(|i| (i as f64 - radius as f64) / sigma_px.max(1e-9))
-        .map(|x| (-0.5 * x * x).exp() as f32)
+        .map(|x| math::exp(-0.5 * x * x) as f32)
         .collect()
 }
 

@@ -10,6 +10,7 @@ use crate::{
     board::CharucoBoard,
     camera::Camera,
     geom::{Board, Color, Pixel, Pose, Rotation, Vector3},
+    math,
 };
 
 /// How a recording goes about it.
@@ -70,7 +71,7 @@ fn hand_held(board: &CharucoBoard, camera: &Camera, seed: u64, frame: usize) -> 
     let [width_m, height_m] = size_m(board);
     // Distances are for the paper's board (209 mm wide) and a lens of 530 px on 640; others are seen as large.
     let lens = camera.intrinsics.focal_px() / camera.intrinsics.width as f64 / (530.0 / 640.0);
-    let reach = lens * width_m.hypot(height_m) / 0.267;
+    let reach = lens * math::hypot(width_m, height_m) / 0.267;
     // The golden angle spreads the directions of any number of frames evenly.
     let azimuth = frame as f64 * PI * (3.0 - 5f64.sqrt()) + random.between(-0.4, 0.4);
     let mut color_from_board = Pose::identity();
@@ -104,7 +105,8 @@ fn hand_held(board: &CharucoBoard, camera: &Camera, seed: u64, frame: usize) -> 
     let way_m = way_px * per_px;
     let motion = Motion {
         rotation_rad: Vector3::new(0.0, 0.0, way_px / 600.0 * random.normal()),
-        translation_m: way_m * Vector3::new(heading.cos(), heading.sin(), 0.3 * random.normal()),
+        translation_m: way_m
+            * Vector3::new(math::cos(heading), math::sin(heading), 0.3 * random.normal()),
     };
     View {
         color_from_board,
@@ -151,7 +153,7 @@ fn looking(
     aim: [f64; 2],
     distance_m: f64,
 ) -> Pose<Color, Board> {
-    let axis = Vector3::new(azimuth.cos(), azimuth.sin(), 0.0);
+    let axis = Vector3::new(math::cos(azimuth), math::sin(azimuth), 0.0);
     let rotation = Rotation::from_scaled_axis(axis * tilt)
         * Rotation::from_scaled_axis(Vector3::new(0.0, 0.0, turn));
     let size = [camera.intrinsics.width, camera.intrinsics.height].map(|n| n as f64);

@@ -1,5 +1,7 @@
 //! What is round the sheet.
 
+use crate::math;
+
 use super::random::{Random, Subject, mixed};
 
 /// The wall the sheet is taped to. Positions are metres in the plane of the board.
@@ -64,7 +66,7 @@ impl Wall {
         let tilt = random.between(-0.06, 0.06);
         let distance = random.between(0.05, 0.075);
         let x = if side < 0.0 { -distance } else { width + distance };
-        let normal = [side * tilt.cos(), side * tilt.sin()];
+        let normal = [side * math::cos(tilt), side * math::sin(tilt)];
         let frame = Line { point: [x, height / 2.0], normal };
         let corners = [[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]];
         let tapes = corners
@@ -77,7 +79,7 @@ impl Wall {
                         out(x, width) + random.between(-0.006, 0.006),
                         out(y, height) + random.between(-0.006, 0.006),
                     ],
-                    along: [angle.cos(), angle.sin()],
+                    along: [math::cos(angle), math::sin(angle)],
                     half_m: [random.between(0.012, 0.028), random.between(0.006, 0.0095)],
                     gain: random.between(0.93, 1.05),
                 }

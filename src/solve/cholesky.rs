@@ -5,6 +5,7 @@
     reason = "triangular loops over two indices read as the formulas do"
 )]
 
+use crate::math;
 use crate::par::{dot, vectorized};
 
 /// A symmetric positive definite matrix as L·Lᵀ.
@@ -43,7 +44,7 @@ impl<const N: usize> Cholesky<N> {
 
     /// The logarithm of the matrix' determinant.
     pub fn log_determinant(&self) -> f64 {
-        (0..N).map(|i| -2.0 * self.factor[i][i].ln()).sum()
+        (0..N).map(|i| -2.0 * math::ln(self.factor[i][i])).sum()
     }
 
     /// L⁻¹·b

@@ -1,5 +1,7 @@
 //! Robust losses: how much a residual that is far off may say.
 
+use crate::math;
+
 /// A loss ρ of a residual measured in its own standard deviations, as a function of s = (r/σ)²; ρ(s) ≈ s for small s.
 ///
 /// Minimised by iteratively reweighted least squares: each residual is weighted by ρ'(s).
@@ -26,7 +28,7 @@ impl Loss {
             Self::Squared => s,
             Self::Huber { threshold: k } if s > k * k => 2.0 * k * s.sqrt() - k * k,
             Self::Huber { .. } => s,
-            Self::Cauchy { scale: k } => k * k * (s / (k * k)).ln_1p(),
+            Self::Cauchy { scale: k } => k * k * math::ln_1p(s / (k * k)),
         }
     }
 

@@ -559,6 +559,7 @@ impl<P: Bordered<S, B>, const S: usize, const B: usize> BySchur<'_, P, S, B> {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::math;
     use crate::solve::{Effort, minimize};
 
     /// Curves y = aᵢ·exp(−k·t) + bᵢ + c·t² (1 + l_j at every tenth t): k and c shared, l loose, a and b of each curve
@@ -582,7 +583,7 @@ pub(super) mod tests {
             normal: &mut BlockNormal<2, 2>,
         ) -> bool {
             for &(t, y) in &self.curves[index] {
-                let e = (-k * t).exp();
+                let e = math::exp(-k * t);
                 let parameter = (10.0 * t / 3.0).round() as usize;
                 let bump =
                     if parameter.is_multiple_of(10) { loose.get(parameter / 10) } else { None };
@@ -621,8 +622,8 @@ pub(super) mod tests {
                 (0..30)
                     .map(|j| {
                         let t = f64::from(j) * 0.3;
-                        let wobble = noise * (12.9 * t + 7.7 * i as f64).sin();
-                        (t, a * (-0.7 * t).exp() + b + 0.05 * t * t + wobble)
+                        let wobble = noise * math::sin(12.9 * t + 7.7 * i as f64);
+                        (t, a * math::exp(-0.7 * t) + b + 0.05 * t * t + wobble)
                     })
                     .collect()
             })

@@ -40,6 +40,13 @@ const FORBIDDEN: &[(&str, &[&str], &str)] = &[
     ("HashSet", &[], "hash order must never reach a result; use BTreeSet"),
 ];
 
+/// Methods whose last bits the platform decides; [`platforms_own`] sees them.
+const TRANSCENDENTAL: &[&str] = &[
+    "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "cbrt", "cos", "cosh", "exp",
+    "exp2", "exp_m1", "hypot", "ln", "ln_1p", "log", "log10", "log2", "mul_add", "powf", "sin",
+    "sin_cos", "sinh", "tan", "tanh",
+];
+
 /// Single files excepted from [`FORBIDDEN`], each with its reason.
 const EXCEPTIONS: &[(&str, &str, &str)] = &[(
     "simulate/truth.rs",
@@ -214,6 +221,47 @@ fn the_library_touches_nothing_outside() {
         }
     }
     assert_none(&faults);
+}
+
+/// Where the standard library's transcendental functions are used, as methods or by path (1-based lines): `powi` too,
+/// unless its exponent is a small number, which makes it a few multiplications.
+fn platforms_own(code: &str) -> Vec<(usize, String)> {
+    let mut found = Vec::new();
+    for (at, _) in code.match_indices(['.', ':']) {
+        let rest = &code[at + 1..];
+        let name =
+            &rest[..rest.find(|c: char| !c.is_ascii_alphanumeric() && c != '_').unwrap_or(0)];
+        let after = &rest[name.len()..];
+        let by_path = code[..at].ends_with("f64:") || code[..at].ends_with("f32:");
+        let is_method = code.as_bytes()[at] == b'.' && after.starts_with('(');
+        let small_power =
+            ["(2)", "(3)", "(4)", "(-2)"].iter().any(|power| after.starts_with(power));
+        if (is_method || by_path)
+            && (TRANSCENDENTAL.contains(&name) || name == "powi" && !small_power)
+        {
+            found.push((code[..at].matches('\n').count() + 1, name.to_owned()));
+        }
+    }
+    found
+}
+
+#[test]
+fn transcendental_functions_come_from_math() {
+    let mut faults = Vec::new();
+    for (room, files) in rooms_with_files() {
+        for path in files.iter().filter(|_| room != "math") {
+            for (line, name) in platforms_own(&product_code(&read(path))) {
+                faults.push(format!(
+                    "{}:{line}: `{name}`: other bits elsewhere; use `math`",
+                    path.display()
+                ));
+            }
+        }
+    }
+    assert_none(&faults);
+    let seen =
+        platforms_own("x.sin()\nf64::exp\ny.powi(2) + y.powi(n)\nself.log.push(x.exponent())");
+    assert_eq!(seen, [(1, "sin".to_owned()), (2, "exp".to_owned()), (3, "powi".to_owned())]);
 }
 
 /// A file of `recording` that opens files stands behind the feature, by its `mod` line or by an attribute inside.

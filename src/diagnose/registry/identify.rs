@@ -1,5 +1,7 @@
 //! Which device a sheet is of, and how sure that is.
 
+use crate::math;
+
 use super::{Entry, KnownIssue, Registry, Sheet};
 
 /// How sure it is.
@@ -61,7 +63,7 @@ impl Registry {
             rows.first().map(|nearest| sheet.focal_px / nearest.sheet.focal_px - 1.0);
         let same_unit = |entry: &&Entry| {
             let [x, y] = entry.sheet.center;
-            let apart = (x - sheet.center[0]).hypot(y - sheet.center[1]);
+            let apart = math::hypot(x - sheet.center[0], y - sheet.center[1]);
             apart < SAME_UNIT_PX && difference(entry) < SAME_UNIT_FOCAL
         };
         let units: Vec<&Entry> = rows.iter().copied().filter(same_unit).collect();

@@ -9,6 +9,7 @@ pub use identify::{Certainty, Identity};
 pub use paper::{PaperFocal, paper_focals};
 pub use user::RegistryError;
 
+use crate::math;
 use crate::recording::Factory;
 
 /// The way a recording was captured.
@@ -116,7 +117,7 @@ impl Sheet {
     /// Distance of distortion centre and principal point, pixels at the reference dimensions.
     pub fn center_distance_px(&self) -> Option<f64> {
         let [x, y] = self.distortion_center?;
-        Some((x - self.center[0]).hypot(y - self.center[1]))
+        Some(math::hypot(x - self.center[0], y - self.center[1]))
     }
 
     /// The paper's column "LDC equals PP".

@@ -1,7 +1,7 @@
 //! Pixels to draw into, with coverage blending.
 
 use super::letters;
-use crate::{geom::Pixel, image::Rgb};
+use crate::{geom::Pixel, image::Rgb, math};
 
 /// A text's look: height of its capitals and thickness of its strokes, pixels, and colour.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,7 +72,7 @@ impl Canvas {
             for x in range(a.x.min(b.x), a.x.max(b.x), self.width) {
                 let [px, py] = Pixel::new(x as f64, y as f64) - a;
                 let along = ((px * dx + py * dy) / length2).clamp(0.0, 1.0);
-                let distance = (px - along * dx).hypot(py - along * dy);
+                let distance = math::hypot(px - along * dx, py - along * dy);
                 let coverage = (0.5 + reach - distance).clamp(0.0, 1.0);
                 if coverage > 0.0 {
                     mix(&mut self.pixels[y * self.width + x], color, coverage);

@@ -8,6 +8,7 @@ use super::{Figure, Key, Table, views_of};
 use crate::{
     audit::Audit,
     calibrate::{Coverage, Tilt},
+    math,
     pose::View,
     report::{
         svg::{WIDTH, n},
@@ -126,7 +127,7 @@ pub(in crate::report) fn view_angles(audit: &Audit) -> Option<Figure> {
     let place = |t: &Tilt| {
         let angle = t.nearest_deg.to_radians();
         [0, 1].map(|axis| {
-            let along = if axis == 0 { angle.cos() } else { angle.sin() };
+            let along = if axis == 0 { math::cos(angle) } else { math::sin(angle) };
             CENTER[axis] + radius(t.tilt_deg) * along
         })
     };
@@ -142,7 +143,7 @@ pub(in crate::report) fn view_angles(audit: &Audit) -> Option<Figure> {
         circle class="best" cx=(cx) cy=(cy) r=(n(f64::midpoint(low, high))) stroke-width=(n(high - low)) {}
         @for ring in RINGS_DEG.into_iter().filter(|ring| *ring <= reach) {
             circle class="ring" cx=(cx) cy=(cy) r=(n(radius(ring))) {}
-            @let at = (TAU / 8.0).sin() * radius(ring);
+            @let at = math::sin(TAU / 8.0) * radius(ring);
             text class="halo small" x=(n(CENTER[0] + at)) y=(n(CENTER[1] - at)) text-anchor="middle"
                 dominant-baseline="central" { (plain(ring, 0)) "°" }
         }

@@ -2,6 +2,7 @@
 
 use maud::{Markup, html};
 
+use crate::math;
 use crate::report::svg::{Plot, n};
 
 /// Counts of values in bins of equal width.
@@ -61,13 +62,13 @@ fn density(values: &[f64], at: &[f64], min_width: f64) -> Vec<f64> {
     let deviation = (sorted.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n as f64).sqrt();
     let range = (sorted[(n - 1) * 3 / 4] - sorted[(n - 1) / 4]) / 1.34;
     let spread = if range > 0.0 { deviation.min(range) } else { deviation };
-    let h = (0.9 * spread * (n as f64).powf(-0.2)).max(min_width);
+    let h = (0.9 * spread * math::pow(n as f64, -0.2)).max(min_width);
     let norm = 1.0 / (h * (2.0 * std::f64::consts::PI).sqrt());
     let kernel = |x: f64| {
         // Beyond 5 h nothing can be seen of a value.
         let from = sorted.partition_point(|v| *v < x - 5.0 * h);
         let near = sorted[from..].iter().take_while(|v| **v <= x + 5.0 * h);
-        near.map(|v| norm * (-0.5 * ((x - v) / h).powi(2)).exp()).sum()
+        near.map(|v| norm * math::exp(-0.5 * ((x - v) / h).powi(2))).sum()
     };
     at.iter().map(|&x| kernel(x)).collect()
 }

@@ -5,6 +5,7 @@
 
 use maud::{Markup, html};
 
+use crate::math;
 use crate::report::{svg::n, words::trimmed};
 
 /// Shades on either side of the middle of a diverging ramp, and of a sequential one above its first.
@@ -140,7 +141,7 @@ fn round_reach(reach: f64) -> f64 {
     if !(reach.is_finite() && reach > 0.0) {
         return 1.0;
     }
-    let power = 10f64.powf(reach.log10().floor());
+    let power = math::pow(10f64, math::log10(reach).floor());
     let round = [1.0, 1.2, 1.6, 2.0, 2.4, 3.0, 4.0, 5.0, 6.0, 8.0];
     round.into_iter().find(|r| r * power >= reach * (1.0 - 1e-9)).unwrap_or(10.0) * power
 }

@@ -6,6 +6,7 @@ use super::{Figure, Key, Table, views_of};
 use crate::{
     audit::Audit,
     geom::Pixel,
+    math,
     report::{
         svg::{WIDTH, n, round_step},
         words::{plain, signed},
@@ -27,7 +28,7 @@ pub(in crate::report) fn residual_field(audit: &Audit) -> Option<Figure> {
         .map(|(corner, residual)| (corner.pixel, *residual))
         .filter(|(pixel, [x, y])| (pixel.x + pixel.y + x + y).is_finite())
         .collect();
-    let mut lengths: Vec<f64> = residuals.iter().map(|(_, [x, y])| x.hypot(*y)).collect();
+    let mut lengths: Vec<f64> = residuals.iter().map(|(_, [x, y])| math::hypot(*x, *y)).collect();
     lengths.sort_by(f64::total_cmp);
     let typical = *lengths.get(lengths.len() * 9 / 10)?;
     let (width, height) = (columns as f64, rows as f64);
