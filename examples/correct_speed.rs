@@ -9,7 +9,8 @@ use std::{error::Error, time::Instant};
 
 use truedepth::{
     correct::{Corrector, Plan},
-    recording::{Defect, Limits, Recording, encode_depth},
+    files::Limits,
+    recording::{Defect, Recording, encode_depth},
 };
 
 #[allow(clippy::print_stdout, reason = "the result of a program")]
@@ -27,7 +28,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut n_bytes = 0;
     for index in 0..recording.frames.len() {
         let start = Instant::now();
-        let (color, depth) = (recording.rgb(index)?, recording.depth(index)?);
+        let (color, depth) = (recording.color(index)?, recording.depth(index)?);
         let decoded = Instant::now();
         let color = corrector.correct_color(index, color)?;
         let depth = corrector.correct_depth(index, depth)?;

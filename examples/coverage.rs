@@ -17,10 +17,12 @@ use std::sync::Arc;
 
 use rayon::prelude::{IntoParallelIterator, ParallelIterator};
 use truedepth::{
-    audit::{Audit, Method, Options, Seen, audit, audit_seen},
-    calibrate::{Estimate, Lens},
-    diagnose::{Code, Finding, Verdict},
-    recording::{Limits, Memory, Recording, StreamState},
+    audit::{Audit, Options, audit, judge},
+    calibrate::{Estimate, Lens, MAX_VIEWS},
+    diagnose::{Code, Finding, Tolerances, Verdict},
+    files::{Limits, Memory},
+    measure::{Method, Silent},
+    recording::{Recording, StreamState},
     simulate::{Device, Faults, Plan},
 };
 
@@ -39,26 +41,15 @@ fn plan(index: usize, seed: usize, faults: &[&str]) -> Plan {
 }
 
 fn judged(plan: &Plan) -> Audit {
-    let factory = plan.factory();
-    let seen = (0..plan.n_frames)
-        .map(|frame| {
-            let glimpse = plan.glimpse(frame);
-            Seen {
-                t_ns: 500_000_000 * frame as i64,
-                size_px: [factory.intrinsics.width, factory.intrinsics.height],
-                observation: glimpse.observation,
-                depth: Some(glimpse.depth),
-            }
-        })
-        .collect();
-    let options = Options { board: Some(plan.board.clone()), ..Options::new(Method::Auto) };
-    audit_seen("simulated", Some(&factory), seen, &options).expect("audits")
+    let measurer = plan.measurer(|_, depth| Some(depth)).expect("depth fits colour");
+    let measured = measurer.finish(plan.about(), &Method::Auto, MAX_VIEWS, &Silent);
+    judge(measured.expect("measures"), Tolerances::default())
 }
 
 fn rendered(plan: &Plan) -> Audit {
     let files = plan.write(Memory::new("simulated"), |_| ()).expect("writes");
-    let recording = Recording::from_source(Arc::new(files), &Limits::default()).expect("opens");
-    audit(&recording, &Options::new(Method::Auto)).expect("audits")
+    let recording = Recording::from_files(Arc::new(files), &Limits::default()).expect("opens");
+    audit(&recording, &Options::new(Method::Auto), &Silent).expect("audits")
 }
 
 /// (value − truth) and σ of everything that was estimated.

@@ -9,13 +9,15 @@
 use std::{fmt::Write, fs, path::Path, sync::Arc};
 
 use truedepth::{
-    audit::{Audit, Method, Options, audit},
+    audit::{Audit, Options, audit},
     calibrate::{Estimate, Lens},
     correct::{DepthWarp, PixelMap, Sampling},
     depth::Pattern,
+    files::{Limits, Memory},
     geom::Pixel,
     image::DepthMap,
-    recording::{Limits, Memory, Recording, encode_depth},
+    measure::{Method, Silent},
+    recording::{FrameImage, Recording, encode_depth},
 };
 
 const RECORDINGS: [(&str, &str); 3] = [
@@ -39,8 +41,9 @@ fn main() {
         panic!("give the folder of the recordings and that of the pages");
     };
     let (data, pages) = (Path::new(&data), Path::new(&pages));
-    let run =
-        |recording: &Recording, method| audit(recording, &Options::new(method)).expect("audits");
+    let run = |recording: &Recording, method| {
+        audit(recording, &Options::new(method), &Silent).expect("audits")
+    };
     let open = |name: &str| Recording::open(data.join(name), &Limits::default()).expect("opens");
     let all: Vec<(&str, Audit, Audit)> = RECORDINGS
         .iter()
@@ -63,7 +66,7 @@ fn main() {
         for zoom in [0.9507, 1.0 / 0.9507] {
             let files = warp(data, name, &open(name), zoom);
             let recording =
-                Recording::from_source(Arc::new(files), &Limits::default()).expect("opens");
+                Recording::from_files(Arc::new(files), &Limits::default()).expect("opens");
             let audit = run(&recording, Method::Auto);
             row(&mut warped, title, &format!("warped by {zoom:.4}"), &audit, as_recorded.value);
         }
@@ -226,7 +229,7 @@ fn warp(data: &Path, name: &str, recording: &Recording, zoom: f64) -> Memory {
     }
     let factory = recording.factory().expect("metadata").intrinsics;
     for (index, frame) in recording.frames.iter().enumerate() {
-        let Some(file) = &frame.depth else { continue };
+        let Some(FrameImage { file, .. }) = &frame.depth else { continue };
         let map = recording.depth(index).expect("decodes");
         let (width, height) = (map.width(), map.height());
         let from = |q: usize, c: f64| (c + zoom * (q as f64 - c)).round();

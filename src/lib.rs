@@ -3,7 +3,7 @@
 //!
 //! The library is a house of rooms, listed here from the ground to the roof. **A room uses only rooms listed above
 //! it**; `tests/it/tidy.rs` fails otherwise. Nothing in here prints, exits, reads arguments, the clock, the
-//! environment or the network; only [`recording`] opens files, and only with the default feature `fs`.
+//! environment or the network; only [`files`] opens files, and only with the default feature `fs`.
 //!
 //! The flow of data is the flow of types: [`recording::Recording`] → [`detect::Observation`] → [`pose::View`] →
 //! [`calibrate::Calibration`] → [`depth::BoardDepth`] → [`diagnose::Finding`] → [`report::wire`].
@@ -40,7 +40,10 @@ pub mod board;
 
 // ── What was seen ──
 
-// Recordings as the capture apps write them: frames paired by time, factory metadata, limits.
+// Named bytes in and out: memory, folders, zip archives, within limits.
+pub mod files;
+
+// Recordings, whatever app wrote them: frames in order of time, factory metadata, images on demand.
 pub mod recording;
 
 // ChArUco corners of an image, each with its own uncertainty.
@@ -56,6 +59,9 @@ pub mod calibrate;
 
 // Sensor depth against the depth of the board.
 pub mod depth;
+
+// Everything that is measured of a recording before anything is judged, frame by frame.
+pub mod measure;
 
 // ── Judgement ──
 

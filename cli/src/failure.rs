@@ -2,7 +2,7 @@
 
 use std::error::Error;
 
-use truedepth::{audit, image, recording};
+use truedepth::{files, image, measure, recording};
 
 /// Why a verb could not run: a message, what lay behind it, and what to do. Every error of the library turns into one
 /// with `?`.
@@ -37,16 +37,19 @@ impl Failure {
 /// True where a limit on what files may ask for was met.
 fn is_limit(error: &(dyn Error + 'static)) -> bool {
     let recording = match error.downcast_ref() {
-        Some(audit::Error::Recording(error)) => Some(error),
+        Some(measure::Error::Recording(error)) => Some(error),
         _ => error.downcast_ref(),
     };
-    matches!(
-        recording,
-        Some(
-            recording::Error::Limit { .. }
-                | recording::Error::Image { source: image::Error::Limits { .. }, .. }
-        )
-    ) || matches!(error.downcast_ref(), Some(image::Error::Limits { .. }))
+    let files = match recording {
+        Some(recording::Error::Files(error)) => Some(error),
+        _ => error.downcast_ref(),
+    };
+    let image = match recording {
+        Some(recording::Error::Image { source, .. }) => Some(source),
+        _ => error.downcast_ref(),
+    };
+    matches!(files, Some(files::Error::Limit { .. }))
+        || matches!(image, Some(image::Error::Limits { .. }))
 }
 
 impl<E: Error + 'static> From<E> for Failure {

@@ -8,13 +8,12 @@ use std::{
     time::{Duration, Instant},
 };
 
+use truedepth::recording::OVERLAY_ENDING;
+
 use crate::failure::Failure;
 
 const JSON: &str = "report.json";
 const HTML: &str = "report.html";
-
-/// How pictures of what was found end.
-pub(crate) const OVERLAY: &str = ".overlay.png";
 
 /// Every `report.json` of ours says so in its `schema`.
 const SCHEMA: &str = "truedepth.";
@@ -105,7 +104,7 @@ impl OverlayFolder {
             .map(|n| if n == 1 { stem.clone() } else { format!("{stem}-{n}") })
             .find(|name| self.taken.insert(name.to_lowercase()))
             .expect("there are more numbers than images");
-        self.path.join(format!("{name}{OVERLAY}"))
+        self.path.join(format!("{name}{OVERLAY_ENDING}"))
     }
 }
 

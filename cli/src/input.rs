@@ -3,6 +3,7 @@
 use std::{
     fs,
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
 use truedepth::{
@@ -10,15 +11,15 @@ use truedepth::{
     calibrate::KnownCamera,
     camera::Camera,
     diagnose::{self, Registry, Sheet},
+    files::{Limits, Paths},
     image,
-    recording::{self, Found, Limits, Recording, board_from_toml},
+    recording::{self, Found, Recording, board_from_toml},
     report::wire::{self, Document},
 };
 
 use crate::{
     args::{BoardArgs, BoardArgument, InputArgs},
     failure::Failure,
-    files::OVERLAY,
 };
 
 /// What a file may ask for.
@@ -35,9 +36,20 @@ pub(crate) fn limits(args: &InputArgs) -> Limits {
     }
 }
 
-/// The recordings in a folder or archive; their metadata are not read yet.
+/// The recordings in a folder or archive; their metadata are not read yet. Folders of images alone are none: there is no
+/// depth in them to look at.
 pub(crate) fn recordings(path: &Path, args: &InputArgs) -> Result<Vec<Found>, Failure> {
-    Ok(recording::discover(path, &limits(args))?)
+    let found = recording::discover(path, &limits(args))?;
+    match found.iter().find(|found| !found.format.has_depth) {
+        None => Ok(found),
+        Some(images) => {
+            let message =
+                format!("{} is {}: there is no depth in it", path.display(), images.format.title);
+            Err(Failure::new(message).hint(
+                "give a recording; `truedepth calibrate` and `truedepth detect` take images alone",
+            ))
+        }
+    }
 }
 
 /// Whether a path holds a recording, or would if it were whole; else it is a file of another kind.
@@ -47,56 +59,43 @@ pub(crate) fn is_recording(path: &Path, args: &InputArgs) -> bool {
 
 /// What can be searched for a board.
 pub(crate) enum Input {
-    /// The recordings in a folder or archive.
+    /// The recordings in a folder or archive, folders of images among them.
     Recordings(Vec<Found>),
-    /// Images, by name.
-    Images(Vec<PathBuf>),
+    /// A single image.
+    Image(PathBuf),
 }
 
 impl Input {
-    /// A folder is the recordings in it, or else its PNG and JPEG images; a file is an archive by its first bytes, or
-    /// else an image, whatever its name.
+    /// A file is an archive by its first bytes, or else an image, whatever its name.
     pub(crate) fn at(path: &Path, args: &InputArgs) -> Result<Self, Failure> {
         match recording::discover(path, &limits(args)) {
             Ok(found) => Ok(Self::Recordings(found)),
             Err(recording::Error::NotARecording { .. }) if path.is_dir() => {
-                let images = images_in(path)?;
-                if images.is_empty() {
-                    let shown = path.display();
-                    return Err(Failure::new(format!(
-                        "{shown} holds neither a recording nor a PNG or JPEG image"
-                    ))
-                    .hint("name a folder that does, or an image"));
-                }
-                Ok(Self::Images(images))
+                let shown = path.display();
+                let message = format!("{shown} holds neither a recording nor a PNG or JPEG image");
+                Err(Failure::new(message).hint("name a folder that does, or an image"))
             }
             Err(recording::Error::NotARecording { .. })
                 if path.is_file() && !has_extension(path, &["zip"]) =>
             {
-                Ok(Self::Images(vec![path.to_owned()]))
+                Ok(Self::Image(path.to_owned()))
             }
             Err(e) => Err(e.into()),
         }
     }
 }
 
-fn has_extension(path: &Path, extensions: &[&str]) -> bool {
-    path.extension().is_some_and(|own| extensions.iter().any(|one| own.eq_ignore_ascii_case(one)))
+/// Images that were named one by one.
+pub(crate) fn images(
+    name: &str,
+    paths: Vec<PathBuf>,
+    args: &InputArgs,
+) -> Result<Recording, Failure> {
+    Ok(Recording::of_images(name, Arc::new(Paths::new(paths)), &limits(args))?)
 }
 
-/// The images of a folder, by name; folders inside are not looked into, and our own overlays are passed over.
-fn images_in(folder: &Path) -> Result<Vec<PathBuf>, Failure> {
-    let unreadable = |e| Failure::from(e).within(format!("cannot look into {}", folder.display()));
-    let mut images = Vec::new();
-    for entry in fs::read_dir(folder).map_err(unreadable)? {
-        let path = entry.map_err(unreadable)?.path();
-        let overlay = path.to_string_lossy().ends_with(OVERLAY);
-        if has_extension(&path, &["png", "jpg", "jpeg"]) && !overlay && path.is_file() {
-            images.push(path);
-        }
-    }
-    images.sort();
-    Ok(images)
+fn has_extension(path: &Path, extensions: &[&str]) -> bool {
+    path.extension().is_some_and(|own| extensions.iter().any(|one| own.eq_ignore_ascii_case(one)))
 }
 
 /// A whole file.

@@ -8,7 +8,10 @@ use std::{
 use anstyle::{AnsiColor, Style};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use truedepth::report::{Line, Tone};
+use truedepth::{
+    measure::{Observer, Progress},
+    report::{Line, Tone},
+};
 
 use crate::{
     args::{ColorChoice, GlobalArgs},
@@ -158,4 +161,14 @@ impl Terminal {
 fn paint(color: bool, tone: Tone, word: &str) -> String {
     let style = style(tone);
     if color && tone != Tone::Plain { format!("{style}{word}{style:#}") } else { word.to_owned() }
+}
+
+/// Moves a progress bar, one step a frame.
+pub(crate) struct Bar<'a>(pub(crate) &'a ProgressBar);
+
+impl Observer for Bar<'_> {
+    fn progress(&self, Progress { done, total, .. }: Progress) {
+        self.0.set_length(total as u64);
+        self.0.set_position(done as u64);
+    }
 }

@@ -30,6 +30,13 @@ impl Intrinsics {
         [(pixel.x - self.cx) / self.fx, (pixel.y - self.cy) / self.fy]
     }
 
+    /// The same for the image at another size. As everywhere here, pixels are scaled without a half-pixel shift.
+    pub fn at_size(&self, [width, height]: [usize; 2]) -> Self {
+        let (sx, sy) = (width as f64 / self.width as f64, height as f64 / self.height as f64);
+        let (fx, fy) = (self.fx * sx, self.fy * sy);
+        Self { fx, fy, cx: self.cx * sx, cy: self.cy * sy, width, height }
+    }
+
     /// The mean of both focal lengths, pixels.
     pub fn focal_px(&self) -> f64 {
         f64::midpoint(self.fx, self.fy)

@@ -107,6 +107,18 @@ pub enum Error {
 }
 
 impl Camera {
+    /// The same camera for images of another size, as [`Intrinsics::at_size`].
+    pub fn at_size(&self, size: [usize; 2]) -> Self {
+        let Intrinsics { width, height, .. } = self.intrinsics;
+        let scale = [size[0] as f64 / width as f64, size[1] as f64 / height as f64];
+        let distortion = match &self.distortion {
+            Distortion::Table(tables) => Distortion::Table(tables.at_scale(scale, size)),
+            // Polynomials are of rays, whatever the pixels.
+            other => other.clone(),
+        };
+        Self { intrinsics: self.intrinsics.at_size(size), distortion }
+    }
+
     /// Refuses images of another size than it is for; `recording` names them in the error.
     pub fn check_size(&self, size: [usize; 2], recording: &str) -> Result<(), OtherSize> {
         let given = [self.intrinsics.width, self.intrinsics.height];

@@ -100,6 +100,13 @@ impl RadialTable {
         math::hypot(reach(center.x, width), reach(center.y, height))
     }
 
+    /// The same table for the image at another size: scaled by `scale`, it has `size` columns and rows.
+    pub fn at_scale(&self, scale: [f64; 2], size: [usize; 2]) -> Self {
+        let center = Pixel::new(self.center.x * scale[0], self.center.y * scale[1]);
+        let max_radius_px = Self::farthest_corner_px(center, size[0], size[1]);
+        Self { center, max_radius_px, magnification: self.magnification.clone() }
+    }
+
     /// Magnification minus one at this distance from the centre, m(r).
     ///
     /// A table with a single sample is constant, one without samples is zero.
@@ -236,6 +243,14 @@ impl RadialTable {
 }
 
 impl TablePair {
+    /// The same tables for the image at another size, as [`RadialTable::at_scale`].
+    pub fn at_scale(&self, scale: [f64; 2], size: [usize; 2]) -> Self {
+        Self {
+            forward: self.forward.at_scale(scale, size),
+            inverse: self.inverse.at_scale(scale, size),
+        }
+    }
+
     /// The pair whose `forward` table is sampled from the exact inverse of `inverse`, at the same radii: what a device
     /// would deliver whose lens is `inverse`.
     pub fn from_inverse(inverse: RadialTable) -> Self {

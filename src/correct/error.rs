@@ -1,6 +1,6 @@
 //! Why a correction cannot be made.
 
-use crate::{camera::OtherSize, recording, recording::DefectError};
+use crate::{camera::OtherSize, files, recording, recording::DefectError};
 
 /// A correction that cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -9,6 +9,9 @@ pub enum Error {
     /// A file cannot be read or written.
     #[error(transparent)]
     Recording(#[from] recording::Error),
+    /// A file cannot be written.
+    #[error(transparent)]
+    Files(#[from] files::Error),
     /// Defects that cannot be.
     #[error(transparent)]
     Defect(#[from] DefectError),

@@ -1,5 +1,7 @@
 //! The correction itself, frame by frame.
 
+use std::collections::BTreeMap;
+
 use sha2::{Digest, Sha256};
 
 use super::{
@@ -9,9 +11,11 @@ use super::{
 };
 use crate::{
     camera::Intrinsics,
+    files::{self, Output},
+    geom::Pixel,
     image::{DepthMap, Rgb},
     par,
-    recording::{Amendment, Factory, Recording, Sink, encode_depth},
+    recording::{Factory, Frame, FrameImage, MetadataEdit, Recording, Writer, encode_depth},
 };
 
 /// What is written beside the corrected files; never carried over as an ordinary file.
@@ -58,61 +62,89 @@ pub struct Progress {
 
 /// Applies the plan to a recording and writes the result. See [`correct_observed`] to be told how far it has come.
 ///
-/// Nothing is written for a plan whose needs the recording cannot meet. After an error the sink holds part of the
+/// Nothing is written for a plan whose needs the recording cannot meet. After an error the output holds part of the
 /// files and must be dropped.
-pub fn correct<S: Sink>(
+pub fn correct<O: Output>(
     recording: &Recording,
     plan: &Plan,
-    sink: &mut S,
+    output: &mut O,
 ) -> Result<Corrected, Error> {
-    correct_observed(recording, plan, sink, &mut |_| {})
+    correct_observed(recording, plan, output, &mut |_| {})
 }
 
 /// As [`correct`]; calls `observer` after every frame.
-pub fn correct_observed<S: Sink>(
+///
+/// What is written is in our own layout, whatever format was read: a recording that is stored like that keeps the names
+/// of its files and what is not understood of its metadata; of another, images and metadata are written anew and all
+/// other files are carried over.
+pub fn correct_observed<O: Output>(
     recording: &Recording,
     plan: &Plan,
-    sink: &mut S,
+    output: &mut O,
     observer: &mut dyn FnMut(Progress),
 ) -> Result<Corrected, Error> {
     let reference = recording.factory().map(|f| f.intrinsics);
-    let amended = |factory: &Factory| plan.intrinsics(&factory.intrinsics);
+    let edited = |factory: &Factory| plan.intrinsics(&factory.intrinsics);
     let corrector = Corrector::new(recording, plan)?;
     let total = recording.frames.len();
     // All that grows with the number of files, in one piece: images come and go, and what is kept between them would
     // leave holes too small for the next.
     let names = recording.file_names();
     let mut hashes: Vec<Option<[u8; 32]>> = vec![None; names.len()];
-    let slot = |name: &str| names.binary_search(&name).expect("files of the recording are listed");
+    let mut set = |name: &str, hash: [u8; 32]| {
+        if let Ok(slot) = names.binary_search(&name) {
+            hashes[slot] = Some(hash);
+        }
+    };
     let mut n_depths = [0; 2];
+    let is_ours = recording.images().stores_as_ours();
+    let times = times_ms(recording);
+    let mut writer = Writer::new(&mut *output);
     // Batches bound the memory, whatever the number of frames.
     const BATCH: usize = 16;
     let frames: Vec<usize> = (0..total).collect();
     par::try_batches(
         &frames,
         BATCH,
-        |&frame| corrector.frame(frame),
-        |frame, outputs| {
-            for output in outputs {
-                sink.write(output.name, &output.bytes)?;
-                n_depths = [0, 1].map(|i| n_depths[i] + output.n_depths[i]);
-                hashes[slot(output.name)] = Some(output.hash);
+        |&index| corrector.frame(index, times[index]),
+        |index, images| {
+            let mut color_size = None;
+            for image in images {
+                writer.output().write(&image.name, &image.bytes)?;
+                n_depths = [0, 1].map(|i| n_depths[i] + image.n_depths[i]);
+                color_size = color_size.or(image.color_size);
+                if let Some((name, hash)) = image.read {
+                    set(&name, hash);
+                }
             }
-            observer(Progress { done: frame + 1, total });
+            let frame = &recording.frames[index];
+            if let (false, Some(factory)) = (is_ours, frame.factory()) {
+                let factory = plan.factory(factory);
+                writer.metadata(times[index], &factory, color_size.unwrap_or(factory.size()))?;
+            }
+            observer(Progress { done: index + 1, total });
             Ok::<_, Error>(())
         },
     )?;
-    let amendment = |timestamp| {
-        let frame = recording.frame_at(timestamp);
-        let factory = frame.and_then(|f| f.factory.as_deref()).or(recording.factory());
-        Amendment {
-            intrinsics: factory.map(amended).filter(|k| factory.is_none_or(|f| f.intrinsics != *k)),
-            rectified: plan.lens().is_some(),
+    if is_ours {
+        let by_id: BTreeMap<&str, &Frame> =
+            recording.frames.iter().map(|frame| (frame.id.as_str(), frame)).collect();
+        let edit = |id: &str| {
+            let factory = by_id.get(id).and_then(|f| f.factory()).or(recording.factory());
+            let intrinsics = factory.and_then(|f| Some(edited(f)).filter(|k| f.intrinsics != *k));
+            MetadataEdit { intrinsics, rectified: plan.lens().is_some() }
+        };
+        recording.images().rewrite_metadata(&edit, writer.output())?;
+        for name in recording.images().metadata_files() {
+            if names.binary_search(&name).is_ok() {
+                set(name, hash_of_file(recording, name)?);
+            }
         }
-    };
-    for name in recording.metadata_names() {
-        hashes[slot(name)] = Some(hash_of_file(recording, name)?);
-        sink.stream(name, &mut |push| recording.amended_metadata(name, &amendment, push))?;
+    } else {
+        if let Some(board) = &recording.board {
+            writer.board(board)?;
+        }
+        writer.finish()?;
     }
     let mut left_out = Vec::new();
     let mut previous = None;
@@ -123,10 +155,10 @@ pub fn correct_observed<S: Sink>(
         *hash = Some(hash_of_file(recording, name)?);
         if name == PROVENANCE {
             previous = Some(recording.file(name)?);
-        } else if recording.is_image_name(name) {
+        } else if recording.images().is_image(name) {
             left_out.push(name.to_owned());
         } else {
-            sink.stream(name, &mut |push| recording.pieces(name, push))?;
+            files::copy(name, recording.open_file(name)?, output, name)?;
         }
     }
     let files: Vec<FileHash> = names
@@ -143,16 +175,26 @@ pub fn correct_observed<S: Sink>(
         files,
         left_out,
         before: reference,
-        after: recording.factory().map(amended),
+        after: recording.factory().map(edited),
         n_frames: total,
         n_depths,
         previous,
     })
 }
 
+/// The times in the names of our own layout, milliseconds: each its own, in order.
+fn times_ms(recording: &Recording) -> Vec<i64> {
+    let mut last = -1;
+    let mut next = |t_ns: i64| {
+        last = (t_ns / 1_000_000).max(last + 1);
+        last
+    };
+    recording.frames.iter().map(|frame| next(frame.t_ns)).collect()
+}
+
 fn hash_of_file(recording: &Recording, name: &str) -> Result<[u8; 32], Error> {
     let mut hash = Sha256::new();
-    recording.pieces(name, &mut |bytes| {
+    files::each_piece(name, recording.open_file(name)?, &mut |bytes| {
         hash.update(bytes);
         Ok(())
     })?;
@@ -163,12 +205,14 @@ fn hexadecimal(digest: &[u8]) -> String {
     digest.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// A file to write in place of one that was read.
-struct Output<'a> {
-    name: &'a str,
-    /// Of what was read.
-    hash: [u8; 32],
+/// An image to write.
+struct Done {
+    name: String,
     bytes: Vec<u8>,
+    /// The file that was read, and its hash.
+    read: Option<(String, [u8; 32])>,
+    /// Columns and rows of a colour image.
+    color_size: Option<[usize; 2]>,
     /// Depth measurements before and after.
     n_depths: [u64; 2],
 }
@@ -176,14 +220,22 @@ struct Output<'a> {
 /// What moves the pixels of a frame; `None` where they stay.
 struct Warps {
     color: Option<ColorWarp>,
+    /// Columns and rows of the colour image that `color` is for.
+    color_size: [usize; 2],
     depth: Option<DepthWarp>,
 }
 
 impl Warps {
-    fn new(recording: &Recording, plan: &Plan, factory: Option<&Factory>) -> Result<Self, Error> {
+    /// Of a frame with these metadata and a colour image of this size; of the size of the depth map where not given.
+    fn new(
+        recording: &Recording,
+        plan: &Plan,
+        factory: Option<&Factory>,
+        color_size: Option<[usize; 2]>,
+    ) -> Result<Self, Error> {
         let after = factory.map(|f| plan.intrinsics(&f.intrinsics));
         let geometry = Geometry::new(plan, factory, after, recording.place())?;
-        let mut warps = Self { color: None, depth: None };
+        let mut warps = Self { color: None, color_size: [0; 2], depth: None };
         let missing = |step| Error::Missing {
             recording: recording.place().to_owned(),
             step,
@@ -198,7 +250,13 @@ impl Warps {
         }
         let Some(Intrinsics { width, height, .. }) = after else { return Err(missing("shift")) };
         if plan.lens().is_some() {
-            let map = PixelMap::new(width, height, |at| geometry.color_source(at));
+            let [w, h] = color_size.unwrap_or([width, height]);
+            warps.color_size = [w, h];
+            let [sx, sy] = [w as f64 / width as f64, h as f64 / height as f64];
+            let map = PixelMap::new(w, h, |at| {
+                let source = geometry.color_source(Pixel::new(at.x / sx, at.y / sy))?;
+                Some(Pixel::new(source.x * sx, source.y * sy))
+            });
             warps.color = Some(ColorWarp::new(&map));
         }
         let map = PixelMap::new(width, height, |at| geometry.depth_source(at));
@@ -218,13 +276,14 @@ impl<'a> Corrector<'a> {
     /// Prepares the plan. Errors: the recording lacks what the plan needs.
     pub fn new(recording: &'a Recording, plan: &'a Plan) -> Result<Self, Error> {
         // One map for all frames of the same metadata, which is nearly always all of them.
-        let usual = Warps::new(recording, plan, recording.factory())?;
+        let color = recording.frames.iter().find_map(|frame| frame.color.as_ref()?.size);
+        let usual = Warps::new(recording, plan, recording.factory(), color)?;
         Ok(Self { recording, plan, usual })
     }
 
     /// The colour image of a frame, corrected.
     pub fn color(&self, index: usize) -> Result<Rgb, Error> {
-        self.correct_color(index, self.recording.rgb(index)?)
+        self.correct_color(index, self.recording.color(index)?)
     }
 
     /// The depth map of a frame, corrected.
@@ -234,53 +293,74 @@ impl<'a> Corrector<'a> {
 
     /// As [`color`](Self::color), for an image of the frame that is decoded already.
     pub fn correct_color(&self, index: usize, image: Rgb) -> Result<Rgb, Error> {
-        let warps = self.warps(index)?;
+        let warps = self.warps(index, Some([image.width(), image.height()]))?;
         Ok(color(image, self.plan, warps.get(&self.usual)))
     }
 
     /// As [`depth`](Self::depth), for a map of the frame that is decoded already.
     pub fn correct_depth(&self, index: usize, map: DepthMap) -> Result<DepthMap, Error> {
-        let warps = self.warps(index)?;
+        let warps = self.warps(index, None)?;
         Ok(depth(map, self.plan, warps.get(&self.usual)))
     }
 
-    /// Frames of other metadata than the recording's get maps of their own.
-    fn warps(&self, index: usize) -> Result<OwnWarps, Error> {
-        Ok(OwnWarps(match self.recording.frames[index].factory.as_deref() {
-            Some(factory)
-                if self.recording.factory() != Some(factory) && self.plan.resamples_depth() =>
-            {
-                Some(Warps::new(self.recording, self.plan, Some(factory))?)
-            }
-            _ => None,
+    /// Frames of other metadata or another size than the recording's get maps of their own.
+    fn warps(&self, index: usize, color_size: Option<[usize; 2]>) -> Result<OwnWarps, Error> {
+        let factory = self.recording.frames[index].factory().or(self.recording.factory());
+        let other = self.recording.factory() != factory
+            || color_size
+                .is_some_and(|size| self.usual.color.is_some() && size != self.usual.color_size);
+        Ok(OwnWarps(if other && self.plan.resamples_depth() {
+            Some(Warps::new(self.recording, self.plan, factory, color_size)?)
+        } else {
+            None
         }))
     }
 
-    /// The files of one frame.
-    fn frame(&self, index: usize) -> Result<Vec<Output<'_>>, Error> {
+    /// The images of one frame as files.
+    fn frame(&self, index: usize, t_ms: i64) -> Result<Vec<Done>, Error> {
         let (recording, plan) = (self.recording, self.plan);
+        let is_ours = recording.images().stores_as_ours();
+        let has_files = !recording.file_names().is_empty();
         let source = &recording.frames[index];
+        let read = |image: &FrameImage| -> Result<Option<Vec<u8>>, Error> {
+            Ok(if has_files { Some(recording.file(&image.file)?) } else { None })
+        };
+        let hashed = |image: &FrameImage, bytes: &Option<Vec<u8>>| {
+            bytes.as_ref().map(|bytes| (image.file.clone(), Sha256::digest(bytes).into()))
+        };
         let mut outputs = Vec::new();
-        if let Some(name) = &source.color {
-            let read = recording.file(name)?;
-            let hash = Sha256::digest(&read).into();
-            let bytes = if plan.changes_color() { self.color(index)?.to_png() } else { read };
-            outputs.push(Output { name, hash, bytes, n_depths: [0; 2] });
+        if let Some(image) = &source.color {
+            let stored = read(image)?;
+            let read = hashed(image, &stored);
+            let mut color_size = None;
+            let bytes = match stored.filter(|_| is_ours && !plan.changes_color()) {
+                Some(bytes) => bytes,
+                None => {
+                    let corrected = self.color(index)?;
+                    color_size = Some([corrected.width(), corrected.height()]);
+                    corrected.to_png()
+                }
+            };
+            let name = if is_ours { image.file.clone() } else { format!("rgb_{t_ms}.png") };
+            outputs.push(Done { name, bytes, read, color_size, n_depths: [0; 2] });
         }
-        if let Some(name) = &source.depth {
-            let read = recording.file(name)?;
-            let hash = Sha256::digest(&read).into();
-            if plan.changes_depth() {
-                let map = recording.depth(index)?;
-                let count =
-                    |map: &DepthMap| map.depth_m().iter().filter(|z| !z.is_nan()).count() as u64;
-                let before = count(&map);
-                let map = self.correct_depth(index, map)?;
-                let n_depths = [before, count(&map)];
-                outputs.push(Output { name, hash, bytes: encode_depth(&map), n_depths });
-            } else {
-                outputs.push(Output { name, hash, bytes: read, n_depths: [0; 2] });
-            }
+        if let Some(image) = &source.depth {
+            let stored = read(image)?;
+            let read = hashed(image, &stored);
+            let (bytes, n_depths) = match stored.filter(|_| is_ours && !plan.changes_depth()) {
+                Some(bytes) => (bytes, [0; 2]),
+                None => {
+                    let map = recording.depth(index)?;
+                    let count = |map: &DepthMap| {
+                        map.depth_m().iter().filter(|z| !z.is_nan()).count() as u64
+                    };
+                    let before = count(&map);
+                    let map = self.correct_depth(index, map)?;
+                    (encode_depth(&map), [before, count(&map)])
+                }
+            };
+            let name = if is_ours { image.file.clone() } else { format!("depth_{t_ms}.png") };
+            outputs.push(Done { name, bytes, read, color_size: None, n_depths });
         }
         Ok(outputs)
     }

@@ -2,7 +2,7 @@
 //!
 //! A [`Plan`] is a list of [`Defect`](crate::recording::Defect)s to remove, each with a [`Reason`]: what an audit found
 //! ([`Plan::of_audit`]), a camera known from elsewhere ([`Plan::of_camera`]), or what the caller names. [`correct`]
-//! applies it frame by frame into a [`Sink`](crate::recording::Sink), never in place: images through one resampling
+//! applies it frame by frame into an [`Output`](crate::files::Output), never in place: images through one resampling
 //! however many steps move pixels, metadata with all the keys it does not understand, every other file as it is. It
 //! hands back what was done, [`Corrected`], for `provenance.json`.
 //!

@@ -7,7 +7,7 @@ use crate::{
     audit::Audit,
     camera::{Camera, Distortion, Intrinsics},
     diagnose::{Code, Verdict},
-    recording::Defect,
+    recording::{Defect, Factory},
 };
 
 /// How depth is resampled.
@@ -319,6 +319,16 @@ impl Plan {
     /// The first defect of the metadata, where there is one.
     pub(super) fn in_metadata(&self) -> Option<Defect> {
         self.find(|defect| (!defect.is_in_data()).then_some(*defect))
+    }
+
+    /// What the metadata of a corrected frame say.
+    pub(super) fn factory(&self, before: &Factory) -> Factory {
+        let mut after = before.clone();
+        after.intrinsics = self.intrinsics(&before.intrinsics);
+        if self.lens().is_some() {
+            (after.tables, after.geometric_distortion_correction) = (None, Some(true));
+        }
+        after
     }
 
     /// What a frame's metadata say of its pinhole once all is done, where `said` is what they said.

@@ -7,7 +7,7 @@
 //!
 //! [`patches`] keeps the board's whole surface of a depth map, and [`register`] takes those of all views to a
 //! [`Registration`]: scale and bias of the sensor, zoom and shift of the depth map against the colour image, with their
-//! covariance and the [`Pattern`] that is left. [`handedness`] tells a mirrored depth map, [`temporal_noise`] what
+//! covariance and the [`Pattern`] that is left. [`handedness`] tells a mirrored depth map, [`NoiseBetweenFrames`] what
 //! comes and goes between frames in which nothing moved.
 //!
 //! The sign is the paper's (arXiv:2201.10865, section 4.2): **error = board depth − sensor depth**, along the optical
@@ -60,5 +60,5 @@ pub use imprint::Imprint;
 pub use patch::{DepthSteps, Patch, Patches, patches};
 pub use pattern::{Holes, MAX_INCIDENCE_DEG, NEAR_M, Pattern, PatternCell};
 pub use register::{OtherState, RegisterInput, Registration, Slopes, register};
-pub use temporal::{Lattice, NoiseAtRange, STILL_PX, TemporalNoise, temporal_noise};
+pub use temporal::{Lattice, NoiseAtRange, NoiseBetweenFrames, STILL_PX, TemporalNoise};
 pub use texture::Texture;

@@ -93,19 +93,23 @@ impl Lattice {
     }
 }
 
-/// Compares successive frames, each with what was seen of the board and what its depth map says; `None` for a frame
-/// without either.
-pub fn temporal_noise(frames: &[Option<(&[Corner], &Patches)>]) -> TemporalNoise {
-    let mut found = TemporalNoise::default();
-    let mut bins: BTreeMap<usize, Vec<PairAtRange>> = BTreeMap::new();
-    for pair in frames.windows(2) {
-        let (Some(before), Some(after)) = (pair[0], pair[1]) else { continue };
-        let Some(moved_px) = motion_px(before.0, after.0) else { continue };
-        found.n_successive += 1;
+/// Compares successive frames as they come.
+#[derive(Clone, Debug, Default)]
+pub struct NoiseBetweenFrames {
+    n_successive: usize,
+    n_still: usize,
+    by_range: BTreeMap<usize, Vec<PairAtRange>>,
+}
+
+impl NoiseBetweenFrames {
+    /// Two successive frames, each with what was seen of the board and what its depth map says.
+    pub fn add(&mut self, before: (&[Corner], &Patches), after: (&[Corner], &Patches)) {
+        let Some(moved_px) = motion_px(before.0, after.0) else { return };
+        self.n_successive += 1;
         if moved_px > STILL_PX {
-            continue;
+            return;
         }
-        found.n_still += 1;
+        self.n_still += 1;
         let one_frame: Vec<(f64, f64)> = [before.1, after.1]
             .iter()
             .flat_map(|patches| &patches.measured)
@@ -122,7 +126,7 @@ pub fn temporal_noise(frames: &[Option<(&[Corner], &Patches)>]) -> TemporalNoise
                 continue;
             }
             let residuals: Vec<f64> = pixels.iter().map(|(_, residual_m)| *residual_m).collect();
-            bins.entry(bin).or_default().push(PairAtRange {
+            self.by_range.entry(bin).or_default().push(PairAtRange {
                 depth_m: median(&pixels.iter().map(|(depth_m, _)| *depth_m).collect::<Vec<_>>()),
                 // Both frames' noise is in the difference.
                 variance: 0.5 * mad_sigma(&residuals, 0.0).powi(2),
@@ -131,11 +135,17 @@ pub fn temporal_noise(frames: &[Option<(&[Corner], &Patches)>]) -> TemporalNoise
             });
         }
     }
-    found.by_range = bins.into_values().map(|pairs| at_range(&pairs)).collect();
-    found
+
+    /// What all pairs say.
+    pub fn finish(self) -> TemporalNoise {
+        let Self { n_successive, n_still, by_range } = self;
+        let by_range = by_range.into_values().map(|pairs| at_range(&pairs)).collect();
+        TemporalNoise { by_range, n_successive, n_still }
+    }
 }
 
 /// What one pair says at some distance.
+#[derive(Clone, Debug)]
 struct PairAtRange {
     depth_m: f64,
     variance: f64,
@@ -247,9 +257,11 @@ mod tests {
                 (corners, patches)
             })
             .collect();
-        let frames: Vec<_> =
-            seen.iter().map(|(corners, patches)| Some((corners.as_slice(), patches))).collect();
-        temporal_noise(&frames)
+        let mut found = NoiseBetweenFrames::default();
+        for pair in seen.windows(2) {
+            found.add((&pair[0].0, &pair[0].1), (&pair[1].0, &pair[1].1));
+        }
+        found.finish()
     }
 
     #[test]
@@ -272,6 +284,6 @@ mod tests {
     fn a_board_that_moves_tells_nothing() {
         let found = noise_of(1e-4, 1.5, 3);
         assert_eq!((found.n_successive, found.n_still, found.by_range.len()), (2, 0, 0));
-        assert_eq!(temporal_noise(&[]), TemporalNoise::default());
+        assert_eq!(NoiseBetweenFrames::default().finish(), TemporalNoise::default());
     }
 }

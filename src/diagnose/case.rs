@@ -13,8 +13,6 @@ use crate::{
     calibrate::{Calibration, DistortionTest, KnownCamera},
     camera::Camera,
     depth::{BoardDepth, DepthSteps, Handedness, Registration, TemporalNoise},
-    detect::Observation,
-    pose::View,
     recording::{Factory, Problem, StreamState},
 };
 
@@ -31,8 +29,10 @@ pub struct Case<'a> {
     pub factory: Option<&'a Factory>,
     /// The board that was looked for.
     pub board: &'a CharucoBoard,
-    /// What was seen of it, frame by frame.
-    pub observations: &'a [&'a Observation],
+    /// Frames in which it was seen.
+    pub n_seen: usize,
+    /// Frames whose markers read only as in a mirror, and all whose markers read.
+    pub n_mirrored_of: (usize, usize),
     /// The own intrinsics.
     pub calibration: Option<&'a Calibration>,
     /// Why there is no calibration.
@@ -41,10 +41,6 @@ pub struct Case<'a> {
     pub camera: Option<&'a Camera>,
     /// Where it is given: what is known of it.
     pub given: Option<&'a KnownCamera>,
-    /// The board's poses with the factory's intrinsics taken as an ideal pinhole.
-    pub factory_views: &'a [&'a View],
-    /// The board's poses with the own camera.
-    pub own_views: &'a [&'a View],
     /// Depth against the board with the factory's intrinsics.
     pub factory_depth: Option<&'a BoardDepth>,
     /// Depth against the board with the own camera.
@@ -78,13 +74,12 @@ impl<'a> Case<'a> {
             size_px: None,
             factory: None,
             board,
-            observations: &[],
+            n_seen: 0,
+            n_mirrored_of: (0, 0),
             calibration: None,
             no_calibration: None,
             camera: None,
             given: None,
-            factory_views: &[],
-            own_views: &[],
             factory_depth: None,
             own_depth: None,
             registration: None,
@@ -101,13 +96,12 @@ impl<'a> Case<'a> {
 impl Case<'_> {
     /// Frames in which the board was seen.
     pub(super) fn n_seen(&self) -> usize {
-        self.observations.iter().filter(|o| !o.corners.is_empty()).count()
+        self.n_seen
     }
 
     /// Frames whose markers read only as in a mirror, and all whose markers read.
     pub(super) fn n_mirrored_of(&self) -> (usize, usize) {
-        let identified = self.observations.iter().filter_map(|o| o.identity.as_ref());
-        identified.fold((0, 0), |(n_mirrored, n), i| (n_mirrored + usize::from(i.mirrored), n + 1))
+        self.n_mirrored_of
     }
 
     /// Why nothing that rests on the own calibration is to be judged, for the end of a sentence; `None` where it fits.

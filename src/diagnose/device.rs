@@ -3,6 +3,7 @@
 use super::{Registry, Sheet};
 use crate::{
     calibrate::Estimate,
+    measure::SAME_CAMERA,
     recording::{Factory, StreamState},
 };
 
@@ -67,10 +68,6 @@ const CAMERAS: [(&str, &str); 5] = [
     ("ipad-12.9-4gen/v2/ar", "iPad Pro 11-inch 2nd or 12.9-inch 4th generation (7 MP), by ARKit"),
     ("iphone-11-pro/ios15/av", "iPhone 11 Pro or a later one with its front camera (12 MP)"),
 ];
-
-/// Units of one camera scatter by 0.6 % in the paper's tables; the iPhone 13's focal length, of which there is no row,
-/// lies 0.7 % below the 11 Pro's.
-pub(crate) const SAME_CAMERA: f64 = 0.015;
 
 /// Whose front camera has these numbers; `None` for any other camera.
 fn model(factory: &Factory) -> Option<&'static str> {

@@ -58,7 +58,6 @@ mod tests;
 
 pub use case::{Case, diagnose};
 pub use code::{Code, UnknownCode};
-pub(crate) use device::SAME_CAMERA;
 pub use device::{Device, Sensor, depth_state};
 pub use finding::{Evidence, Finding, Tolerances, Unit, Verdict};
 pub use inspect::{Inspection, inspect};

@@ -6,14 +6,20 @@ use std::{
     sync::Arc,
 };
 
-use super::{Error, Limits, Recording, Source, source::join, zeiss};
+use super::{
+    Error, Recording,
+    format::{Contents, FORMATS, Format},
+};
+use crate::files::{Files, Limits, join};
 
 /// A recording that has been found, but not read yet.
 #[derive(Clone)]
 pub struct Found {
     /// Name of its folder or archive, for people.
     pub name: String,
-    source: Arc<dyn Source>,
+    /// How it is stored.
+    pub format: &'static Format,
+    files: Arc<dyn Files>,
     folder: String,
     limits: Limits,
 }
@@ -21,18 +27,25 @@ pub struct Found {
 impl Found {
     /// Reads the metadata; images wait until they are asked for.
     pub fn open(self) -> Result<Recording, Error> {
-        zeiss::open(self.source, &self.folder, self.name, &self.limits)
+        let contents = Contents::new(self.files, &self.folder, &self.limits);
+        let opened = (self.format.open)(&contents)?;
+        Ok(Recording::of(self.name, self.format.name, contents, opened))
     }
 
     /// Where it is: the path of the folder or archive, and the folder inside.
     pub fn place(&self) -> String {
-        join(self.source.place(), &self.folder)
+        join(self.files.place(), &self.folder)
     }
 }
 
 impl fmt::Debug for Found {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Found").field("name", &self.name).field("place", &self.place()).finish()
+        let Self { name, format, .. } = self;
+        let mut text = f.debug_struct("Found");
+        text.field("name", name)
+            .field("format", &format.name)
+            .field("place", &self.place())
+            .finish()
     }
 }
 
@@ -40,25 +53,14 @@ impl fmt::Debug for Found {
 /// [`Error::NotARecording`].
 #[cfg(feature = "fs")]
 pub fn discover(path: &std::path::Path, limits: &Limits) -> Result<Vec<Found>, Error> {
-    use std::io::Read;
-
-    let fail = |error| super::folder::file_error(path, &error);
-    let metadata = std::fs::metadata(path).map_err(fail)?;
-    if metadata.is_dir() {
-        return discover_in(Arc::new(super::Folder::open(path, limits)?), limits);
+    match crate::files::open(path, limits)? {
+        Some(files) => discover_in(files, limits),
+        None => {
+            let what = if path.is_file() { "file that is no zip archive" } else { "special file" };
+            let path = path.display().to_string();
+            Err(Error::NotARecording { path, found: format!("a {what}") })
+        }
     }
-    let not_a_recording =
-        |found: String| Err(Error::NotARecording { path: path.display().to_string(), found });
-    if !metadata.is_file() {
-        return not_a_recording("neither a file nor a folder".into());
-    }
-    let mut start = Vec::new();
-    std::fs::File::open(path).map_err(fail)?.take(4).read_to_end(&mut start).map_err(fail)?;
-    // A zip starts with its first file, or with its end where it has none.
-    if start != *b"PK\x03\x04" && start != *b"PK\x05\x06" {
-        return not_a_recording("a file that is no zip archive".into());
-    }
-    discover_in(Arc::new(super::Archive::open(path, limits)?), limits)
 }
 
 /// As [`discover`], also inside the zip archives of a folder, as published data are packed; the archives after the
@@ -73,7 +75,7 @@ pub fn discover_nested(path: &std::path::Path, limits: &Limits) -> Result<Vec<Fo
         return discover(path, limits);
     }
     let mut found = or_none(discover(path, limits))?;
-    let folder = super::Folder::open(path, limits)?;
+    let folder = crate::files::Folder::open(path, limits)?;
     for name in folder.names() {
         if name.to_ascii_lowercase().ends_with(".zip") {
             found.extend(or_none(discover(&path.join(name), limits))?);
@@ -82,51 +84,50 @@ pub fn discover_nested(path: &std::path::Path, limits: &Limits) -> Result<Vec<Fo
     Ok(found)
 }
 
-/// All recordings among the files of a source, by name. At least one, else [`Error::NotARecording`].
+/// All recordings among these files, by name. At least one, else [`Error::NotARecording`].
 ///
 /// A folder that is a recording itself is one: folders further inside are not looked at.
-pub fn discover_in(source: Arc<dyn Source>, limits: &Limits) -> Result<Vec<Found>, Error> {
-    let names = source.names();
+pub fn discover_in(files: Arc<dyn Files>, limits: &Limits) -> Result<Vec<Found>, Error> {
+    let names = files.names();
     if names.len() > limits.files {
         let what = format!("{} files are more than the limit of {}", names.len(), limits.files);
-        return Err(Error::Limit { file: source.place().to_owned(), what });
+        let file = files.place().to_owned();
+        return Err(crate::files::Error::Limit { file, what }.into());
     }
-    let mut folders = BTreeSet::new();
-    for name in names {
-        let (folder, file) = name.rsplit_once('/').unwrap_or(("", name));
-        if zeiss::is_telltale(file) {
-            folders.insert(folder);
-        }
-    }
-    let outermost = |folder: &str| {
+    let found = FORMATS.iter().find_map(|format| {
+        let folders: BTreeSet<&str> = names
+            .iter()
+            .filter(|name| (format.recognises)(name))
+            .map(|name| name.rsplit_once('/').map_or("", |(folder, _)| folder))
+            .collect();
+        (!folders.is_empty()).then_some((format, folders))
+    });
+    let Some((format, folders)) = found else {
+        let path = files.place().to_owned();
+        return Err(Error::NotARecording { path, found: describe(names) });
+    };
+    let is_inside_another = |folder: &str| {
         !folder.is_empty()
             && (folders.contains("")
                 || folder.match_indices('/').any(|(at, _)| folders.contains(&folder[..at])))
     };
-    let found: Vec<Found> = folders
-        .iter()
-        .filter(|folder| !outermost(folder))
-        .map(|&folder| Found {
-            name: name_of(source.place(), folder),
-            source: Arc::clone(&source),
-            folder: folder.to_owned(),
-            limits: limits.clone(),
-        })
-        .collect();
-    if found.is_empty() {
-        let path = source.place().to_owned();
-        return Err(Error::NotARecording { path, found: describe(names) });
-    }
-    Ok(found)
+    let found = |&folder: &&str| Found {
+        name: name_of(files.place(), folder),
+        format,
+        files: Arc::clone(&files),
+        folder: folder.to_owned(),
+        limits: limits.clone(),
+    };
+    Ok(folders.iter().filter(|folder| !is_inside_another(folder)).map(found).collect())
 }
 
 /// The single recording of a source.
-pub(super) fn only(source_place: &str, mut found: Vec<Found>) -> Result<Found, Error> {
+pub(super) fn only(place: &str, mut found: Vec<Found>) -> Result<Found, Error> {
     match (found.pop(), found.is_empty()) {
         (Some(only), true) => Ok(only),
         (last, _) => {
             let names = found.into_iter().chain(last).map(|found| found.folder).collect();
-            Err(Error::Several { path: source_place.to_owned(), names })
+            Err(Error::Several { path: place.to_owned(), names })
         }
     }
 }

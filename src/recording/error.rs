@@ -1,6 +1,6 @@
 //! Why a recording cannot be read or written.
 
-use crate::image;
+use crate::{files, image};
 
 /// Why a recording cannot be read or written. Every message names the file, the place in it, and the remedy.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -35,13 +35,8 @@ pub enum Error {
         names: Vec<String>,
     },
     /// A file that cannot be read or written.
-    #[error("{file}: {why}; check that it is there, and that you have the right to it")]
-    File {
-        /// The file.
-        file: String,
-        /// What the system said.
-        why: String,
-    },
+    #[error(transparent)]
+    Files(#[from] files::Error),
     /// An image that cannot be decoded.
     #[error("{file}: {source}")]
     Image {
@@ -52,8 +47,8 @@ pub enum Error {
     },
     /// An image of another size than the metadata says.
     #[error(
-        "{file} is {}x{} pixels, but {said_by} says {}x{} for timestamp {timestamp}: image and metadata are not of \
-         one recording, or one of them was changed; copy both from the device again",
+        "{file} is {}x{} pixels, but {said_by} says {}x{} for frame {frame}: image and metadata are not of one \
+         recording, or one of them was changed; copy both from the device again",
         .size[0], .size[1], .expected[0], .expected[1]
     )]
     ImageSize {
@@ -65,8 +60,8 @@ pub enum Error {
         said_by: String,
         /// Columns and rows there.
         expected: [usize; 2],
-        /// The frame.
-        timestamp: i64,
+        /// What people call the frame.
+        frame: String,
     },
     /// A frame without the image that was asked for.
     #[error("{path} has no {what} at frame {frame}: use the frames that have one")]
@@ -137,21 +132,5 @@ pub enum Error {
         file: String,
         /// What is wrong, and the remedy.
         why: String,
-    },
-    /// An archive that cannot be used.
-    #[error("{file}: {why}")]
-    Archive {
-        /// The archive.
-        file: String,
-        /// What is wrong, and the remedy.
-        why: String,
-    },
-    /// More than the limits allow.
-    #[error("{file}: {what}; if you trust it, raise the limits")]
-    Limit {
-        /// The file or folder.
-        file: String,
-        /// What is more than which limit.
-        what: String,
     },
 }

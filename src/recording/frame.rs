@@ -7,34 +7,58 @@ use crate::{
     geom::Pixel,
 };
 
-/// One moment: a colour image, its depth map and its metadata, each where present.
+/// One moment: a colour image and its depth map, each where present.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
+    /// What people call it: the timestamp in the file's name, the file's name, a number.
+    pub id: String,
     /// Time since the first frame of the recording, nanoseconds.
     pub t_ns: i64,
-    /// The timestamp as written in the file (ZEISS app: milliseconds since boot). Names the frame for people.
-    pub timestamp: i64,
-    /// Name of the colour image inside the recording.
-    pub color: Option<String>,
-    /// Name of the depth image inside the recording.
-    pub depth: Option<String>,
-    /// What the factory says about the camera at this frame: one and the same for all frames of which it says the same.
-    pub factory: Option<Arc<Factory>>,
-    /// Columns and rows of the colour image after the colour camera's metadata.
-    pub(super) color_size: Option<[usize; 2]>,
+    /// The colour image.
+    pub color: Option<FrameImage>,
+    /// The depth map.
+    pub depth: Option<FrameImage>,
 }
 
-/// Factory metadata of one frame.
+impl Frame {
+    /// What the factory says about the camera, at the size of the depth map; of a frame without one, at that of the
+    /// colour image.
+    pub fn factory(&self) -> Option<&Factory> {
+        let mut images = [&self.depth, &self.color].into_iter().flatten();
+        images.find_map(|image| image.factory.as_deref())
+    }
+}
+
+/// An image of a frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrameImage {
+    /// Name of its file inside the recording; in memory, whatever messages shall call it.
+    pub file: String,
+    /// Columns and rows, where the metadata tell them: an image of another size is an error.
+    pub size: Option<[usize; 2]>,
+    /// What the factory says about the camera, at the size of this image: one and the same for all images of which it
+    /// says the same.
+    pub factory: Option<Arc<Factory>>,
+}
+
+impl FrameImage {
+    /// An image of this name, of which nothing else is known.
+    pub fn named(file: impl Into<String>) -> Self {
+        Self { file: file.into(), size: None, factory: None }
+    }
+}
+
+/// Factory metadata of one image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Factory {
-    /// Intrinsics at the size of the depth map.
+    /// Intrinsics at the size of the image.
     pub intrinsics: Intrinsics,
     /// `intrinsicMatrixReferenceDimensions`, pixels.
     pub reference_dimensions: Option<[f64; 2]>,
-    /// Lens distortion centre at the size of the depth map. Scaled by the ratio of the sizes without a half-pixel
-    /// shift, as the app scaled the principal point: where the file has both at one place, so have we.
+    /// Lens distortion centre at the size of the image. Scaled by the ratio of the sizes without a half-pixel shift,
+    /// as the capture app scaled the principal point: where the file has both at one place, so have we.
     pub distortion_center: Option<Pixel>,
-    /// Both lookup tables at the size of the depth map.
+    /// Both lookup tables at the size of the image.
     pub tables: Option<TablePair>,
     /// Pixel size at the reference dimensions, metres.
     pub pixel_size_m: Option<f64>,
@@ -51,6 +75,9 @@ pub struct Factory {
     /// Horizontal field of view as the device format states it, radians.
     pub field_of_view_rad: Option<f64>,
 }
+
+/// Sizes whose shapes differ by more than this share are not the same picture at two sizes.
+const SAME_SHAPE: f64 = 0.01;
 
 impl Factory {
     /// Only a pinhole, and nothing else known.
@@ -70,8 +97,29 @@ impl Factory {
         }
     }
 
-    /// Columns and rows of the depth map.
-    pub(super) fn size(&self) -> [usize; 2] {
+    /// Columns and rows of the image.
+    pub fn size(&self) -> [usize; 2] {
         [self.intrinsics.width, self.intrinsics.height]
+    }
+
+    /// The same at another size of the image. `None` for a size of another shape: whether it was cropped or squeezed is
+    /// not known.
+    pub fn at_size(&self, size: [usize; 2]) -> Option<Self> {
+        let own = self.size();
+        if own == size {
+            return Some(self.clone());
+        }
+        let [sx, sy] = [0, 1].map(|i| size[i] as f64 / own[i] as f64);
+        if !((sx / sy - 1.0).abs() <= SAME_SHAPE) {
+            return None;
+        }
+        let place = |p: Pixel| Pixel::new(p.x * sx, p.y * sy);
+        let tables = self.tables.as_ref().map(|t| t.at_scale([sx, sy], size));
+        Some(Self {
+            intrinsics: self.intrinsics.at_size(size),
+            distortion_center: self.distortion_center.map(place),
+            tables,
+            ..self.clone()
+        })
     }
 }

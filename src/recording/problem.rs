@@ -11,6 +11,11 @@ pub enum Problem {
         /// The file.
         file: &'static str,
     },
+    /// A metadata file ends after a whole record, but without its end: whoever wrote it was stopped. Nothing is lost.
+    MetadataUnfinished {
+        /// The file.
+        file: &'static str,
+    },
     /// Metadata entries for which there is no image.
     MetadataWithoutImages {
         /// Timestamps as written.
@@ -92,6 +97,10 @@ impl fmt::Display for Problem {
             Self::MetadataMissing { file } => {
                 write!(f, "{file} is missing: what it says about the camera is not known")
             }
+            Self::MetadataUnfinished { file } => write!(
+                f,
+                "{file} has no end: the app that wrote it was stopped; all of its records are whole and are used"
+            ),
             Self::MetadataWithoutImages { timestamps } => write!(
                 f,
                 "{} metadata entries have no image: {}",

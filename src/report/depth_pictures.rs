@@ -8,8 +8,9 @@ use super::{
 };
 use crate::{
     correct::{Corrector, Plan},
+    files::Output,
     image::{DepthMap, Rgb, animated_png},
-    recording::{Frame, Recording, Sink},
+    recording::{Frame, Recording},
 };
 
 /// Width of the panel of a picture with one panel, and with two.
@@ -33,7 +34,7 @@ pub enum After<'a> {
     Nothing,
     /// The recording as it would be after these corrections.
     Corrected(&'a Plan),
-    /// Another recording's frames of the same timestamps.
+    /// Another recording's frames of the same ids.
     Recording(&'a Recording),
 }
 
@@ -104,7 +105,7 @@ pub struct DrawnFrame {
     /// Index in the recording.
     pub frame: usize,
     /// As written in the file.
-    pub timestamp: i64,
+    pub id: String,
     /// Its name.
     pub file: String,
     /// Fraction of the depth map without measurement; after the correction, too, where there is one.
@@ -125,7 +126,7 @@ impl DepthPictures<'_> {
     ///
     /// Errors: a frame that is not there; no frame with both colour and depth; images of different sizes; files that
     /// cannot be read or written. After an error the sink holds part of the files and must be dropped.
-    pub fn draw<S: Sink>(
+    pub fn draw<S: Output>(
         &self,
         sink: &mut S,
         observer: &mut dyn FnMut(usize, usize),
@@ -169,8 +170,8 @@ impl DepthPictures<'_> {
                 let holes = shots.iter().map(|shot| holes(&shot.depth)).collect();
                 let median_m = shots.iter().map(|shot| median_m(&shot.depth)).collect();
                 let source = &self.recording.frames[frame];
-                let file = format!("overlay_{}.png", source.timestamp);
-                let done = DrawnFrame { frame, timestamp: source.timestamp, file, holes, median_m };
+                let file = format!("overlay_{}.png", source.id.replace('/', "_"));
+                let done = DrawnFrame { frame, id: source.id.clone(), file, holes, median_m };
                 Ok::<_, Error>((done, image.to_png(), thumbnail))
             },
             |index, (done, png, thumbnail)| {
@@ -263,7 +264,7 @@ impl DepthPictures<'_> {
         }
         match self.after {
             After::Recording(other) => {
-                other.frames.iter().position(|f| f.timestamp == source.timestamp && whole(f))
+                other.frames.iter().position(|f| f.id == source.id && whole(f))
             }
             _ => Some(frame),
         }
@@ -276,7 +277,7 @@ impl DepthPictures<'_> {
         } else if !has(|f| f.color.is_some()) {
             ("a colour image", "copy the rgb_*.png files, too")
         } else if matches!(self.after, After::Recording(_)) {
-            ("a frame of the same timestamp in the other recording", "give its own correction")
+            ("a frame of the same time in the other recording", "give its own correction")
         } else {
             (
                 "both colour and depth",
@@ -294,13 +295,13 @@ impl DepthPictures<'_> {
         let title = if alone { "depth over colour" } else { "before" };
         let mut shots = vec![Shot {
             title,
-            color: self.recording.rgb(frame)?,
+            color: self.recording.color(frame)?,
             depth: self.recording.depth(frame)?,
         }];
         let after = |color, depth| Shot { title: "after", color, depth };
         match (self.after, corrector) {
             (After::Recording(there), _) => {
-                shots.push(after(there.rgb(other)?, there.depth(other)?))
+                shots.push(after(there.color(other)?, there.depth(other)?))
             }
             (_, Some(corrector)) => {
                 shots.push(after(corrector.color(frame)?, corrector.depth(frame)?));
@@ -340,10 +341,10 @@ impl DepthPictures<'_> {
         };
         Plate {
             heading: format!(
-                "{} · frame {frame} (0 to {}) · timestamp {} ms",
+                "{} · frame {frame} (0 to {}) · {}",
                 self.recording.name,
                 self.recording.frames.len() - 1,
-                source.timestamp
+                source.id
             ),
             panels: shots.iter().map(panel).collect(),
             bar: style.bar(),

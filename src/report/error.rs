@@ -1,6 +1,6 @@
 //! Documents that cannot be read back, pictures that cannot be drawn.
 
-use crate::{correct, recording};
+use crate::{correct, files, recording};
 
 /// A document that cannot be read back, or a picture that cannot be drawn.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -18,6 +18,9 @@ pub enum Error {
     /// A file of the recording cannot be read, or a picture not be written.
     #[error(transparent)]
     Recording(#[from] recording::Error),
+    /// A file cannot be written.
+    #[error(transparent)]
+    Files(#[from] files::Error),
     /// The correction to be shown cannot be made.
     #[error(transparent)]
     Correct(#[from] correct::Error),

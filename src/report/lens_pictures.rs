@@ -10,9 +10,10 @@ use crate::{
     board::CharucoBoard,
     correct::{self, BoardLine, ColorWarp, Rectifier, Straightness, Treatment, board_lines},
     detect::{Detector, Observation},
+    files::Output,
     geom::Pixel,
     image::Rgb,
-    recording::{Recording, Sink, StreamState},
+    recording::{Recording, StreamState},
 };
 
 /// Bows are drawn so many times larger than they are.
@@ -47,7 +48,7 @@ pub struct LensFrame {
     /// Index in the recording.
     pub frame: usize,
     /// As written in the file.
-    pub timestamp: i64,
+    pub id: String,
     /// Its name.
     pub file: String,
     /// Distance of corners from their lines under each of [`Treatment::ALL`], root mean square, pixels; `None` where
@@ -60,7 +61,7 @@ impl LensPictures<'_> {
     ///
     /// Errors: a frame that is not there; no colour image; images of another size than the lens is for; files that
     /// cannot be read or written.
-    pub fn draw<S: Sink>(
+    pub fn draw<S: Output>(
         &self,
         sink: &mut S,
         observer: &mut dyn FnMut(usize, usize),
@@ -76,7 +77,7 @@ impl LensPictures<'_> {
                 remedy: "copy the rgb_*.png files, too",
             });
         };
-        let image = self.recording.rgb(first)?;
+        let image = self.recording.color(first)?;
         let size = [image.width(), image.height()];
         if let Rectifier::Camera(camera) = self.rectifier {
             camera.check_size(size, self.recording.place()).map_err(correct::Error::from)?;
@@ -88,7 +89,7 @@ impl LensPictures<'_> {
         in_batches(
             &frames,
             |&frame| {
-                let image = self.recording.rgb(frame)?;
+                let image = self.recording.color(frame)?;
                 let found = [image.width(), image.height()];
                 if found != size {
                     let recording = self.recording.place().to_owned();
@@ -100,9 +101,8 @@ impl LensPictures<'_> {
                 let source = &self.recording.frames[frame];
                 let mut one = Straightness::default();
                 one.add([&lines[0], &lines[1], &lines[2]]);
-                let file = format!("undistort_{}.png", source.timestamp);
-                let timestamp = source.timestamp;
-                let done = LensFrame { frame, timestamp, file, rms_px: one.rms_px() };
+                let file = format!("undistort_{}.png", source.id.replace('/', "_"));
+                let done = LensFrame { frame, id: source.id.clone(), file, rms_px: one.rms_px() };
                 Ok((done, plate.draw(size[1] as f64 / 48.0).to_png(), lines))
             },
             |index, (done, png, lines)| {
@@ -118,7 +118,7 @@ impl LensPictures<'_> {
 
     /// The picture of one frame alone. Errors as [`draw`](Self::draw).
     pub(super) fn one(&self, frame: usize) -> Result<Rgb, Error> {
-        let image = self.recording.rgb(frame)?;
+        let image = self.recording.color(frame)?;
         let (width, height) = (image.width(), image.height());
         let warps = Treatment::ALL.map(|t| ColorWarp::new(&self.rectifier.map(t, width, height)));
         let observation = self.board.map(|board| Detector::new(board).detect(&image.to_gray()));
@@ -153,8 +153,8 @@ impl LensPictures<'_> {
             .collect();
         let source = &self.recording.frames[frame];
         let heading = format!(
-            "{} · frame {frame} · timestamp {} ms · orange: bows of the board's rows and columns, {BOW} times as large",
-            self.recording.name, source.timestamp
+            "{} · frame {frame} · {} · orange: bows of the board's rows and columns, {BOW} times as large",
+            self.recording.name, source.id
         );
         (Plate { heading, panels, bar: None }, lines)
     }

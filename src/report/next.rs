@@ -171,8 +171,8 @@ mod tests {
     #[test]
     fn what_cannot_be_told_is_recorded_again() {
         let mut audit = sample::audit();
-        audit.calibration = None;
-        audit.camera = None;
+        audit.measured.calibration = None;
+        audit.measured.camera = None;
         audit.findings.retain(|f| f.verdict != Verdict::Fault);
         let commands = commands(&audit, &Typed::of(&audit));
         assert_eq!(commands[0], "truedepth audit NEW");

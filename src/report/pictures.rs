@@ -7,8 +7,9 @@ use std::{
 
 use super::photo::{Photo, PhotoSize, base64};
 use crate::{
-    audit::{Audit, FrameAudit},
+    audit::Audit,
     image::{DepthMap, Rgb},
+    measure::FrameMeasurement,
     par,
     recording::{self, Recording},
 };
@@ -82,6 +83,11 @@ impl Thumbnails {
         Self(Mutex::default(), recording.frames.len() <= MAX_PHOTOS)
     }
 
+    /// Whether photos of all frames are wanted.
+    pub fn wants_all(&self) -> bool {
+        self.1
+    }
+
     /// Keeps a small photo of this frame. From any thread.
     pub fn see(&self, frame: usize, image: &Rgb) {
         if self.1 {
@@ -111,15 +117,17 @@ impl Pictures {
     ) -> Result<Self, recording::Error> {
         let choice = Choice::new(audit);
         let made = thumbnails.0.into_inner().unwrap_or_else(PoisonError::into_inner);
-        let photo = |&frame: &usize| {
+        let photo = |&frame: &usize| -> Result<Photo, recording::Error> {
             if let (Some(photo), false) = (made.get(&frame), choice.large.contains(&frame)) {
                 return Ok(photo.clone());
             }
             let size =
                 if choice.large.contains(&frame) { PhotoSize::Large } else { PhotoSize::Small };
-            Ok(Photo::new(frame, &recording.rgb(frame)?, size))
+            Ok(Photo::new(frame, &recording.color(frame)?, size))
         };
-        let closeup = |&frame: &usize| Ok(Closeup::new(frame, &recording.depth(frame)?));
+        let closeup = |&frame: &usize| -> Result<Closeup, recording::Error> {
+            Ok(Closeup::new(frame, &recording.depth(frame)?))
+        };
         Ok(Self {
             photos: par::try_map(&choice.photos, photo)?,
             closeups: par::try_map(&choice.closeups, closeup)?,
@@ -139,7 +147,7 @@ impl Choice {
     fn new(audit: &Audit) -> Self {
         let frames = &audit.frames;
         let with_image: Vec<usize> =
-            (0..frames.len()).filter(|&frame| frames[frame].color.is_some()).collect();
+            (0..frames.len()).filter(|&f| frames[f].color.is_some() && frames[f].in_full).collect();
         let closeups = closeups(frames);
         let mut worst = with_image.clone();
         worst.sort_by(|&a, &b| rms_px(&frames[b]).total_cmp(&rms_px(&frames[a])));
@@ -154,7 +162,7 @@ impl Choice {
 }
 
 /// Frames with colour, depth and a view, spread over those that show at least as many corners as the middle one.
-fn closeups(frames: &[FrameAudit]) -> Vec<usize> {
+fn closeups(frames: &[FrameMeasurement]) -> Vec<usize> {
     let n_corners = |frame: usize| frames[frame].observation.corners.len();
     let mut able: Vec<usize> = (0..frames.len())
         .filter(|&frame| {
@@ -183,7 +191,7 @@ fn completed(mut chosen: Vec<usize>, all: &[usize], wanted: usize) -> Vec<usize>
 }
 
 /// How well the board's pose explains the corners; 0 where there is no pose.
-pub(super) fn rms_px(frame: &FrameAudit) -> f64 {
+pub(super) fn rms_px(frame: &FrameMeasurement) -> f64 {
     frame.own_view.as_ref().or(frame.factory_view.as_ref()).map_or(0.0, |view| view.rms_px)
 }
 
@@ -201,9 +209,9 @@ mod tests {
         assert!(choice.photos.windows(2).all(|pair| pair[0] < pair[1]), "{choice:?}");
         // Many frames, one of them bad: it is among those shown large.
         let template = audit.frames[0].clone();
-        audit.frames = (0..200).map(|_| template.clone()).collect();
-        audit.frames[117].own_view.as_mut().expect("the sample has one").rms_px = 9.0;
-        audit.frames[5].color = None;
+        audit.measured.frames = (0..200).map(|_| template.clone()).collect();
+        audit.measured.frames[117].own_view.as_mut().expect("the sample has one").rms_px = 9.0;
+        audit.measured.frames[5].color = None;
         let Choice { photos, large, closeups } = Choice::new(&audit);
         assert_eq!(
             [photos.len(), large.len(), closeups.len()],
@@ -213,7 +221,7 @@ mod tests {
         assert!(photos.last().is_some_and(|&last| last > 150), "spread: {photos:?}");
         assert!(closeups.iter().all(|frame| large.contains(frame)), "{closeups:?} {large:?}");
         assert!(large.iter().all(|frame| photos.contains(frame)), "{photos:?} {large:?}");
-        audit.frames.clear();
+        audit.measured.frames.clear();
         assert_eq!(Choice::new(&audit).photos, [0; 0]);
     }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::{Closeup, Photo, PhotoSize, Pictures};
 use crate::{
-    audit::{Audit, FrameAudit, Method},
+    audit::Audit,
     board::{CharucoBoard, Layout},
     calibrate::{
         self, BoardSurface, Calibration, Candidate, DistortionTest, Estimate, FrameCorners,
@@ -18,11 +18,13 @@ use crate::{
     },
     detect::{Corner, Identity, Observation, Reason, Reject},
     diagnose::{Code, Device, Evidence, Finding, Sensor, Unit, Verdict},
+    files::{Limits, Memory},
     geom::{Board, Color, Pixel, Pose, Rotation, Vector3},
     image::{DepthMap, Rgb},
     math,
+    measure::{FrameMeasurement, Measurements, Method},
     pose::View,
-    recording::{Defect, Factory, Limits, Memory, Problem, Recording, StreamState, Writer},
+    recording::{Defect, Factory, Problem, Recording, StreamState, Writer},
 };
 
 const N_FRAMES: usize = 12;
@@ -31,8 +33,9 @@ const OWN_FOCAL_PX: f64 = 530.04;
 
 pub(super) fn audit() -> Audit {
     let board: CharucoBoard = "10x8:20.875mm:10.4375mm:ARUCO_ORIGINAL".parse().expect("a board");
-    let frames: Vec<FrameAudit> = (0..N_FRAMES).map(|frame| frame_audit(frame, &board)).collect();
-    let depth = |view: fn(&FrameAudit) -> Option<&View>| {
+    let frames: Vec<FrameMeasurement> =
+        (0..N_FRAMES).map(|frame| frame_audit(frame, &board)).collect();
+    let depth = |view: fn(&FrameMeasurement) -> Option<&View>| {
         let views: Vec<(&View, &[Option<f64>])> =
             frames.iter().filter_map(|f| Some((view(f)?, f.sensor_m.as_slice()))).collect();
         against_board(&board, None, &views)
@@ -45,18 +48,19 @@ pub(super) fn audit() -> Audit {
     factory.depth_absolute = Some(true);
     factory.device_type = Some("AVCaptureDeviceTypeBuiltInTrueDepthCamera".to_owned());
     let calibration = calibration(&frames);
-    Audit {
+    let device = Device {
+        sensor: Sensor::TrueDepth,
+        device_type: factory.device_type.clone(),
+        model: Some("iPad Pro 12.9\" (5th generation)"),
+    };
+    let measured = Measurements {
         name: "iPadPro12_5gen".to_owned(),
         method: Method::Auto,
-        device: Device {
-            sensor: Sensor::TrueDepth,
-            device_type: factory.device_type.clone(),
-            model: Some("iPad Pro 12.9\" (5th generation)"),
-        },
         layout: Some(Layout::Legacy),
         problems: vec![Problem::MetadataWithoutImages { timestamps: vec![100_500, 101_000] }],
         factory: Some(factory),
         camera: Some(calibration.camera.clone()),
+        given: None,
         no_calibration: None,
         factory_depth: Some(depth(|f| f.factory_view.as_ref())),
         own_depth: Some(depth(|f| f.own_view.as_ref())),
@@ -65,11 +69,15 @@ pub(super) fn audit() -> Audit {
         handedness: None,
         distortion: calibration.distortion.clone(),
         calibration: Some(calibration),
+        frames,
+        board,
+    };
+    Audit {
+        measured,
+        device,
         distortion_state: StreamState::Rectified,
         depth_distortion_state: StreamState::Rectified,
         findings: findings(),
-        frames,
-        board,
     }
 }
 
@@ -89,12 +97,12 @@ pub(super) fn rich_audit() -> Audit {
         calibrate::Input { board: &board, factory: &factory, tables: None, frames: &input_frames };
     let model = calibrate::Method::Robust(Model::FocalCentre);
     let motion = calibrate::calibrate(&input, model).expect("the sample is good enough").motion;
-    for (index, frame) in audit.frames.iter_mut().enumerate() {
+    for (index, frame) in audit.measured.frames.iter_mut().enumerate() {
         let depth_m = 0.24 + 0.015 * index as f32;
         let map = DepthMap::new(640, 480, vec![depth_m; 640 * 480]);
         frame.patches = patches(&map, &board, &frame.observation.corners);
     }
-    let calibration = audit.calibration.as_mut().expect("the sample has one");
+    let calibration = audit.measured.calibration.as_mut().expect("the sample has one");
     calibration.motion = motion;
     let heights_m = (0..board.n_corners()).map(|id| 4e-4 * wobble(id)).collect();
     calibration.surface = Some(BoardSurface {
@@ -120,7 +128,7 @@ pub(super) fn rich_audit() -> Audit {
         fixed_m: 3e-4,
         holes: Holes::default(),
     };
-    audit.temporal_noise = TemporalNoise {
+    audit.measured.temporal_noise = TemporalNoise {
         by_range: vec![NoiseAtRange {
             depth_m: 0.2,
             noise_m: estimate(9e-5, 3e-6),
@@ -131,7 +139,7 @@ pub(super) fn rich_audit() -> Audit {
         n_successive: 4,
         n_still: 4,
     };
-    audit.registration = Some(Registration {
+    audit.measured.registration = Some(Registration {
         scale: estimate(1.003, 0.009),
         bias_m: estimate(-5e-4, 1e-3),
         zoom: estimate(0.9507, 0.001),
@@ -163,7 +171,7 @@ pub(super) fn recording() -> Recording {
     let depth = DepthMap::new(640, 480, vec![0.25; 640 * 480]);
     writer.frame(500, &color, &depth, factory).expect("memory takes everything");
     let memory = writer.finish().expect("as above");
-    Recording::from_source(Arc::new(memory), &Limits::default()).expect("it was just written")
+    Recording::from_files(Arc::new(memory), &Limits::default()).expect("it was just written")
 }
 
 /// Grey pictures, and a depth map.
@@ -187,7 +195,7 @@ fn wobble(i: usize) -> f64 {
     x - 1.0
 }
 
-fn frame_audit(frame: usize, board: &CharucoBoard) -> FrameAudit {
+fn frame_audit(frame: usize, board: &CharucoBoard) -> FrameMeasurement {
     let at = frame as f64;
     let own = Camera { intrinsics: intrinsics(OWN_FOCAL_PX), distortion: Distortion::None };
     let tilt = Vector3::new(0.32 * math::sin(1.7 * at), 0.35 * math::cos(2.3 * at), 0.05 * at);
@@ -237,12 +245,16 @@ fn frame_audit(frame: usize, board: &CharucoBoard) -> FrameAudit {
     };
     let rejects =
         vec![Reject { pixel: Pixel::new(12.0 + 9.0 * at, 33.0), reason: Reason::NoCrossing }];
-    FrameAudit {
-        timestamp: 100_000 + 500 * frame as i64,
+    FrameMeasurement {
+        id: (100_000 + 500 * frame).to_string(),
         t_ns: 500_000_000 * frame as i64,
         color: Some(format!("rgb_{}.png", 100_000 + 500 * frame)),
         depth: Some(format!("depth_{}.png", 100_000 + 500 * frame)),
+        factory: None,
         size_px: Some([640, 480]),
+        depth_size_px: Some([640, 480]),
+        n_corners: corners.len(),
+        in_full: true,
         observation: Observation { corners, identity: Some(identity), rejects },
         sensor_m,
         patches: None,
@@ -252,7 +264,7 @@ fn frame_audit(frame: usize, board: &CharucoBoard) -> FrameAudit {
     }
 }
 
-fn calibration(frames: &[FrameAudit]) -> Calibration {
+fn calibration(frames: &[FrameMeasurement]) -> Calibration {
     let estimate = |value, sigma| Estimate { value, sigma };
     let candidate = |model, rms_px, held_out_rms_px, focal_px| Candidate {
         model,

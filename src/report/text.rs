@@ -439,9 +439,10 @@ mod tests {
     #[test]
     fn what_waits_for_the_camera_is_said_once() {
         let mut audit = sample::audit();
-        audit.no_calibration = Some("the 5 views do not determine a focal length".to_owned());
-        audit.calibration = None;
-        audit.camera = None;
+        audit.measured.no_calibration =
+            Some("the 5 views do not determine a focal length".to_owned());
+        audit.measured.calibration = None;
+        audit.measured.camera = None;
         for code in [Code::TD201, Code::TD301] {
             let finding =
                 audit.findings.iter_mut().find(|f| f.code == code).expect("the sample has it");
@@ -460,7 +461,7 @@ mod tests {
         let audit = sample::audit();
         assert_eq!(overview(&[Overview::of(&audit, &Typed::of(&audit))], 100), []);
         let mut other = sample::audit();
-        other.name = "short".to_owned();
+        other.measured.name = "short".to_owned();
         other.findings.retain(|f| f.verdict == Verdict::Ok);
         let both =
             [Overview::of(&audit, &Typed::of(&audit)), Overview::of(&other, &Typed::of(&other))];
@@ -479,7 +480,7 @@ mod tests {
     #[test]
     fn a_name_cannot_move_the_cursor() {
         let mut audit = sample::audit();
-        audit.name = "\u{1b}[2Jx\n".to_owned();
+        audit.measured.name = "\u{1b}[2Jx\n".to_owned();
         let text: String =
             summary(&audit, &Typed::of(&audit), 100).iter().map(Line::to_plain).collect();
         assert!(!text.contains(char::is_control) && text.contains("\u{fffd}[2Jx"));

@@ -271,10 +271,14 @@ pub(super) fn board_line(audit: &Audit) -> String {
     let board = &audit.board;
     let size = audit.frames.iter().find_map(|frame| frame.size_px);
     let size = size.map_or(String::new(), |[width, height]| format!(" of {width}x{height} px"));
+    let n_seen = audit.n_frames_with_board();
+    let used = match audit.n_frames_summarised() {
+        0 => String::new(),
+        n => format!(", of which the {} that differ most are used", n_seen - n),
+    };
     format!(
-        "{}{size}, board seen in {} · {}x{} squares of {} mm, {}",
+        "{}{size}, board seen in {n_seen}{used} · {}x{} squares of {} mm, {}",
         count(audit.frames.len(), "frame"),
-        audit.n_frames_with_board(),
         board.squares_x,
         board.squares_y,
         trimmed(1e3 * board.square_m, 3),

@@ -6,10 +6,11 @@ use super::{
     recompute,
 };
 use crate::{
-    audit::{self, Audit, Method, Options, audit},
+    audit::{Audit, Options, audit},
     calibrate::{Estimate, KnownCamera},
     correct::{Rectifier, Straightness, Treatment, board_lines},
     diagnose::{Entry, Registry, Sheet},
+    measure::{self, Method, Silent},
     recording::StreamState,
 };
 
@@ -72,12 +73,12 @@ pub fn reproduce(
     place: &str,
     data: Vec<Data>,
     observer: &mut dyn FnMut(&str),
-) -> Result<Reproduction, audit::Error> {
+) -> Result<Reproduction, measure::Error> {
     let registry = Registry::published();
     let mut calibrated = Vec::new();
     for (index, one) in data.iter().enumerate().filter(|(_, one)| one.set == Set::Calibration) {
         observer(&format!("{}: calibrating", one.recording.name));
-        let run = |method| audit(&one.recording, &Options::new(method));
+        let run = |method| audit(&one.recording, &Options::new(method), &Silent);
         calibrated.push(Calibrated {
             data: index,
             paper: run(Method::Paper)?,
@@ -94,7 +95,7 @@ pub fn reproduce(
         let has_own = own.is_some();
         let method =
             own.map_or(Method::Paper, |camera| Method::Given(Box::new(KnownCamera::exact(camera))));
-        let audit = Box::new(audit(&one.recording, &Options::new(method))?);
+        let audit = Box::new(audit(&one.recording, &Options::new(method), &Silent)?);
         depth.push(DepthEvaluation { data: index, title: title(one), audit, has_own });
     }
     let lens: Vec<Lens> = calibrated.iter().filter_map(|c| lens(&data[c.data], c)).collect();

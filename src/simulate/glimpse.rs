@@ -1,5 +1,7 @@
 //! A recording without pictures: corners and depth maps as a detector and a sensor would give them.
 
+use std::sync::Arc;
+
 use super::{
     plan::Plan,
     random::{Random, Subject},
@@ -12,6 +14,8 @@ use crate::{
     geom::Pixel,
     image::DepthMap,
     math,
+    measure::{self, About, Measurer},
+    recording::{Frame, FrameImage},
 };
 
 /// What is known of a frame once it was looked at.
@@ -30,6 +34,42 @@ const SHARP_PX: f64 = 0.06;
 const PER_MOTION: f64 = 0.06;
 
 impl Plan {
+    /// What a recording of this plan says of itself.
+    pub fn about(&self) -> About {
+        let name = "simulated".to_owned();
+        About { place: name.clone(), name, problems: Vec::new(), factory: Some(self.factory()) }
+    }
+
+    /// All frames as [`glimpse`](Self::glimpse) sees them, measured; `depth` may change a frame's depth map or take it
+    /// away.
+    ///
+    /// Errors: a changed depth map of another shape.
+    pub fn measurer(
+        &self,
+        depth: impl Fn(usize, DepthMap) -> Option<DepthMap>,
+    ) -> Result<Measurer, measure::Error> {
+        let factory = Arc::new(self.factory());
+        let size_px = factory.size();
+        let mut measurer = Measurer::new(&self.board);
+        for frame in 0..self.n_frames {
+            let Glimpse { observation, depth: map } = self.glimpse(frame);
+            let image = |file: &str| {
+                let factory = Some(Arc::clone(&factory));
+                Some(FrameImage { file: file.to_owned(), size: Some(size_px), factory })
+            };
+            let id = self.timestamp(frame).to_string();
+            let t_ns = 500_000_000 * frame as i64;
+            let (color, depth_image) = (image("color"), image("depth"));
+            let frame_of = Frame { id, t_ns, color, depth: depth_image };
+            let mut found = measurer.seen(&frame_of, size_px, observation);
+            if let Some(map) = depth(frame, map) {
+                measurer.look_at_depth(&mut found, &map, "simulated")?;
+            }
+            measurer.add(found);
+        }
+        Ok(measurer)
+    }
+
     /// Frame `frame` without rendering and detecting: true corners with normal noise whose σ grows with the frame's
     /// motion, and the depth map. A thousand times as many recordings can be judged in this way as with pictures; what
     /// is not in it are the detector's own slips (wrong places of corners that are half hidden, blur that σ does not

@@ -26,7 +26,7 @@
 //!
 //! A [`Plan`] makes a whole recording: a [`Device`] with chosen [`Faults`] is led along a [`Trajectory`], and
 //! [`Plan::write`] puts images, depth maps, metadata, `board.toml` and `truth.json` ([`Truth`]) into a
-//! [`Sink`](crate::recording::Sink).
+//! [`Output`](crate::files::Output).
 //!
 //! ```
 //! use truedepth::simulate::{Device, Faults, Plan};

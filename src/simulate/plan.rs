@@ -14,10 +14,11 @@ use super::{
 use crate::{
     board::{CharucoBoard, Dictionary, Layout},
     camera::{Camera, Distortion, Intrinsics, RadialTable, TablePair},
+    files::Output,
     geom::Pixel,
     image::{DepthMap, Rgb},
     par,
-    recording::{Defect, Error, Factory, Sink, StreamState, Writer, encode_depth},
+    recording::{Defect, Error, Factory, StreamState, Writer, encode_depth},
 };
 
 /// What to simulate: everything that follows is decided by these fields.
@@ -265,7 +266,7 @@ impl Plan {
 
     /// Writes the recording, with `board.toml` and `truth.json`. `done` is called after every frame with the number
     /// of frames written.
-    pub fn write<S: Sink>(&self, sink: S, mut done: impl FnMut(usize)) -> Result<S, Error> {
+    pub fn write<S: Output>(&self, sink: S, mut done: impl FnMut(usize)) -> Result<S, Error> {
         let mut writer = Writer::new(sink);
         let factory = self.factory();
         // Batches bound the memory, whatever the number of frames.
@@ -282,13 +283,13 @@ impl Plan {
             |frame, (timestamp, (color_png, depth_png))| {
                 writer.encoded_frame(timestamp, &color_png, &depth_png, &factory)?;
                 done(frame + 1);
-                Ok(())
+                Ok::<_, Error>(())
             },
         )?;
         let board = CharucoBoard { layout: Some(self.layout()), ..self.board.clone() };
         writer.board(&board)?;
-        writer.file("truth.json", self.truth().to_json().as_bytes())?;
-        writer.finish()
+        writer.output().write("truth.json", self.truth().to_json().as_bytes())?;
+        Ok(writer.finish()?)
     }
 }
 
@@ -303,8 +304,9 @@ mod tests {
 
     use super::*;
     use crate::{
+        files::{Limits, Memory},
         geom::{Homography, Point},
-        recording::{Limits, Memory, Recording},
+        recording::Recording,
     };
 
     fn plan(device: &str, faults: &[&str]) -> Plan {
@@ -501,12 +503,12 @@ mod tests {
                 serde_json::from_slice(files.get("truth.json").expect("written")).unwrap();
             assert_eq!(truth, plan.truth());
             assert_eq!(truth.board.parse::<CharucoBoard>().unwrap(), plan.board);
-            let recording = Recording::from_source(Arc::new(files), &Limits::default()).unwrap();
+            let recording = Recording::from_files(Arc::new(files), &Limits::default()).unwrap();
             assert!(recording.problems.is_empty(), "{:?}", recording.problems);
             assert_eq!(recording.board.as_ref(), Some(&plan.board));
             assert_eq!(recording.frames.len(), 3);
-            assert_eq!(recording.frames[1].timestamp, truth.frames[1].timestamp);
-            let (factory, read) = (plan.factory(), recording.frames[2].factory.clone().unwrap());
+            assert_eq!(recording.frames[1].id, truth.frames[1].timestamp.to_string());
+            let (factory, read) = (plan.factory(), recording.frames[2].factory().unwrap());
             assert!((read.intrinsics.fx - factory.intrinsics.fx).abs() < 1e-9);
             assert_eq!(read.geometric_distortion_correction, Some(tables));
             assert_eq!(read.tables.is_some(), tables);
@@ -515,7 +517,7 @@ mod tests {
                 assert!(read.inverse.center.distance(written.inverse.center) < 1e-9);
             }
             let frame = plan.frame(1);
-            assert_eq!(recording.rgb(1).unwrap(), frame.color);
+            assert_eq!(recording.color(1).unwrap(), frame.color);
             let pairs = recording.depth(1).unwrap();
             for (a, b) in pairs.depth_m().iter().zip(frame.depth.depth_m()) {
                 assert!(a.is_nan() == b.is_nan() && !((a - b).abs() > 1e-6), "{a} {b}");

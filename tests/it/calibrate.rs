@@ -9,8 +9,9 @@ use truedepth::{
     },
     camera::Intrinsics,
     detect::Detector,
+    files::Limits,
     image::{Gray, Limits as ImageLimits},
-    recording::{Limits, Recording},
+    recording::Recording,
 };
 
 use crate::data;

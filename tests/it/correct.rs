@@ -3,22 +3,24 @@
 use std::sync::Arc;
 
 use truedepth::{
-    audit::{Audit, Method, Options, audit},
+    audit::{Audit, Options, audit},
     camera::{Camera, Distortion},
     correct::{Plan, Sampling, Selection, correct},
     diagnose::{Code, Verdict},
-    recording::{Defect, Limits, Memory, Recording},
+    files::{Limits, Memory},
+    measure::{Method, Silent},
+    recording::{Defect, Recording},
     simulate::{Device, Faults, Plan as Simulation},
 };
 
 use crate::data;
 
 fn run(recording: &Recording) -> Audit {
-    audit(recording, &Options::new(Method::Auto)).expect("audits")
+    audit(recording, &Options::new(Method::Auto), &Silent).expect("audits")
 }
 
 fn opened(memory: Memory) -> Recording {
-    Recording::from_source(Arc::new(memory), &Limits::default()).expect("opens")
+    Recording::from_files(Arc::new(memory), &Limits::default()).expect("opens")
 }
 
 fn faults(audit: &Audit) -> Vec<Code> {
@@ -153,20 +155,27 @@ fn focal_length_of_the_real_ipad() {
     };
     let Some(still) = data("zeiss/DepthEvalDataset/iPadPro12_5gen_iOS15") else { return };
     let camera = run(&Recording::open(&moving, &Limits::default()).expect("opens"))
+        .measured
         .camera
         .expect("calibrates");
     let recording = Recording::open(&still, &Limits::default()).expect("opens");
     let said = recording.factory().expect("has metadata").intrinsics;
     let fixed = applied(&recording, &Plan::of_camera(&camera, &said).expect("a plan"));
     let error_mm = |recording: &Recording| {
-        1e3 * run(recording).factory_depth.expect("depth").mean_of_medians_m.expect("frames").value
+        1e3 * run(recording)
+            .measured
+            .factory_depth
+            .expect("depth")
+            .mean_of_medians_m
+            .expect("frames")
+            .value
     };
     let (before, after) = (error_mm(&recording), error_mm(&fixed));
     assert!((before - 13.7).abs() < 0.2, "{before}");
     assert!(after.abs() < 2.0, "{after}");
     // Only metadata change: images are the very bytes.
     if camera.distortion == Distortion::None {
-        let name = recording.frames[0].depth.as_deref().expect("has depth");
+        let name = recording.frames[0].depth.as_ref().expect("has depth").file.as_str();
         assert_eq!(fixed.file(name), recording.file(name));
     }
 }
@@ -176,7 +185,7 @@ fn mirroring_twice_is_nothing_and_a_wrong_camera_is_refused() {
     let (_, recording) = simulated(&["focal=1%"]);
     let unmirror = Plan::given(&[Defect::Mirrored]).unwrap().sampled(Sampling::Nearest);
     let twice = applied(&applied(&recording, &unmirror), &unmirror);
-    assert_eq!(twice.rgb(3).unwrap(), recording.rgb(3).unwrap());
+    assert_eq!(twice.color(3).unwrap(), recording.color(3).unwrap());
     let same = |a: &Recording, b: &Recording| {
         let (a, b) = (a.depth(3).unwrap(), b.depth(3).unwrap());
         a.depth_m().iter().zip(b.depth_m()).all(|(a, b)| a.to_bits() == b.to_bits())

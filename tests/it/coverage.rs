@@ -1,11 +1,12 @@
 //! A small version of `cargo run --release --example coverage`: are the uncertainties true?
 
 use truedepth::{
-    audit::{Audit, Method, Options, Seen, audit_seen},
+    audit::{Audit, judge},
     calibrate::{Estimate, MAX_VIEWS},
-    depth::{patches, temporal_noise},
-    diagnose::{Code, Verdict},
+    depth::{NoiseBetweenFrames, patches},
+    diagnose::{Code, Tolerances, Verdict},
     image::DepthMap,
+    measure::{Method, Silent},
     recording::StreamState,
     simulate::{Device, Faults, Plan},
 };
@@ -28,19 +29,9 @@ fn audit_with(
     max_views: usize,
     depth: impl Fn(usize, DepthMap) -> Option<DepthMap>,
 ) -> Audit {
-    let factory = plan.factory();
-    let seen = (0..plan.n_frames).map(|frame| {
-        let glimpse = plan.glimpse(frame);
-        Seen {
-            t_ns: 500_000_000 * frame as i64,
-            size_px: [640, 480],
-            observation: glimpse.observation,
-            depth: depth(frame, glimpse.depth),
-        }
-    });
-    let board = Some(plan.board.clone());
-    let options = Options { board, max_views, ..Options::new(Method::Auto) };
-    audit_seen("simulated", Some(&factory), seen.collect(), &options).expect("audits")
+    let measurer = plan.measurer(depth).expect("depth fits colour");
+    let measured = measurer.finish(plan.about(), &Method::Auto, max_views, &Silent);
+    judge(measured.expect("measures"), Tolerances::default())
 }
 
 fn faults(audit: &Audit) -> Vec<Code> {
@@ -99,7 +90,7 @@ fn one_wrong_depth_map_does_not_count() {
                 if frame == 4 { depth(map) } else { Some(map) }
             },
         );
-        found.registration.expect("registers").slopes
+        found.measured.registration.expect("registers").slopes
     };
     let (without, with) = (of(&|_| None), of(&|map| Some(wrong(map))));
     let [[x, y], [also_x, also_y]] = [without.shift_px, with.shift_px];
@@ -127,7 +118,7 @@ fn faults_of_depth_are_told_apart() {
     let wrong = ["depth-zoom=0.9507", "depth-shift=3px,-2px", "depth-scale=1.5%", "depth-bias=5mm"];
     let (_, audit) = judged("ipad-12.9-5gen", 3, &wrong);
     assert_eq!(faults(&audit), [Code::TD301, Code::TD302, Code::TD401, Code::TD402]);
-    let found = audit.registration.expect("registers");
+    let found = audit.measured.registration.expect("registers");
     assert!((1.0 - found.zoom.value) / found.zoom.sigma > 10.0, "{:?}", found.zoom);
     let [x, y] = found.shift_px;
     for (estimate, truth) in
@@ -150,7 +141,9 @@ fn noise_between_frames_is_the_simulated_sensors() {
         let corners = first.observation.corners.as_slice();
         let [before, after] = [&first, &second]
             .map(|glimpse| patches(&glimpse.depth, &plan.board, corners).expect("a board"));
-        let found = temporal_noise(&[Some((corners, &before)), Some((corners, &after))]);
+        let mut found = NoiseBetweenFrames::default();
+        found.add((corners, &before), (corners, &after));
+        let found = found.finish();
         assert_eq!((found.n_successive, found.n_still), (1, 1));
         let truth = plan.truth().depth;
         for at in found.by_range {

@@ -7,6 +7,7 @@ mod correct;
 mod coverage;
 mod detect;
 mod detect_any;
+mod measure;
 mod order;
 mod photos;
 mod real_alignment;

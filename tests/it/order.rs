@@ -3,18 +3,20 @@
 use std::sync::Arc;
 
 use truedepth::{
-    audit::{Audit, Method, Options, audit},
+    audit::{Audit, Options, audit},
     calibrate::Estimate,
-    recording::{Limits, Memory, Recording, Writer},
+    files::{Limits, Memory},
+    measure::{Method, Silent},
+    recording::{FrameImage, Recording, Writer},
     simulate::{Device, Faults, Plan},
 };
 
 fn audited(recording: &Recording) -> Audit {
-    audit(recording, &Options::new(Method::Auto)).expect("audits")
+    audit(recording, &Options::new(Method::Auto), &Silent).expect("audits")
 }
 
 fn open(files: Memory) -> Recording {
-    Recording::from_source(Arc::new(files), &Limits::default()).expect("opens")
+    Recording::from_files(Arc::new(files), &Limits::default()).expect("opens")
 }
 
 /// The same pictures under other names and timestamps, in another order.
@@ -24,10 +26,10 @@ fn renamed(recording: &Recording) -> Recording {
     for place in 0..n {
         // Every frame once: n has no factor 5.
         let frame = &recording.frames[(5 * place + 3) % n];
-        let file = |name: &Option<String>| {
-            recording.file(name.as_ref().expect("has both images")).expect("reads")
+        let file = |image: &Option<FrameImage>| {
+            recording.file(&image.as_ref().expect("has both images").file).expect("reads")
         };
-        let factory = frame.factory.as_ref().expect("has metadata");
+        let factory = frame.factory().expect("has metadata");
         let timestamp = 77_000 + 310 * place as i64;
         writer
             .encoded_frame(timestamp, &file(&frame.color), &file(&frame.depth), factory)

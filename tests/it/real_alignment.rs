@@ -3,12 +3,14 @@
 use std::sync::Arc;
 
 use truedepth::{
-    audit::{Audit, Method, Options, audit},
+    audit::{Audit, Options, audit},
     depth::Registration,
     diagnose::{Code, Verdict, depth_state},
+    files::{Limits, Memory},
     geom::Pixel,
     image::DepthMap,
-    recording::{Limits, Memory, Recording, StreamState, encode_depth},
+    measure::{Method, Silent},
+    recording::{FrameImage, Recording, StreamState, encode_depth},
 };
 
 use crate::data;
@@ -20,7 +22,7 @@ const RECORDINGS: [&str; 3] = [
 ];
 
 fn run(recording: &Recording) -> Audit {
-    audit(recording, &Options::new(Method::Auto)).expect("audits")
+    audit(recording, &Options::new(Method::Auto), &Silent).expect("audits")
 }
 
 fn registration(audit: &Audit) -> &Registration {
@@ -73,7 +75,7 @@ fn moved(recording: &Recording, from: impl Fn(Pixel) -> Option<Pixel>) -> Record
         files.insert(name, recording.file(name).expect("reads"));
     }
     for (index, frame) in recording.frames.iter().enumerate() {
-        let Some(file) = &frame.depth else { continue };
+        let Some(FrameImage { file, .. }) = &frame.depth else { continue };
         let map = recording.depth(index).expect("decodes");
         let width = map.width();
         let depth_m = (0..width * map.height())
@@ -88,7 +90,7 @@ fn moved(recording: &Recording, from: impl Fn(Pixel) -> Option<Pixel>) -> Record
         assert!(files.get(file).is_some(), "{file} is replaced, not added");
         files.insert(file.clone(), encode_depth(&DepthMap::new(width, map.height(), depth_m)));
     }
-    Recording::from_source(Arc::new(files), &Limits::default()).expect("opens")
+    Recording::from_files(Arc::new(files), &Limits::default()).expect("opens")
 }
 
 /// Every second frame against the others: each half calibrates for itself. With ten frames to a half an honest σ²
@@ -105,7 +107,7 @@ fn halves_agree() {
             let left_out = recording.frames.iter().enumerate().filter(|(i, _)| i % 2 != odd);
             let left_out: Vec<&str> = left_out
                 .flat_map(|(_, f)| f.color.iter().chain(&f.depth))
-                .map(String::as_str)
+                .map(|image| image.file.as_str())
                 .collect();
             let mut files = Memory::new("half");
             for name in recording.file_names() {
@@ -113,7 +115,7 @@ fn halves_agree() {
                     files.insert(name, recording.file(name).expect("reads"));
                 }
             }
-            run(&Recording::from_source(Arc::new(files), &Limits::default()).expect("opens"))
+            run(&Recording::from_files(Arc::new(files), &Limits::default()).expect("opens"))
         };
         let (even, odd) = (half(0), half(1));
         let (even, odd) = (registration(&even), registration(&odd));

@@ -1,9 +1,11 @@
 //! Audits of the published recordings (ZEISS/iPad_TrueDepth_Issue_Eval): what issue 2 asks to be shown.
 
 use truedepth::{
-    audit::{Audit, Method, Options, audit},
+    audit::{Audit, Options, audit},
     diagnose::{Code, Finding, Sensor, Verdict},
-    recording::{Limits, Recording, StreamState},
+    files::Limits,
+    measure::{Method, Silent},
+    recording::{Recording, StreamState},
 };
 
 use crate::data;
@@ -17,7 +19,7 @@ const IPAD5_DEPTH: &str = "zeiss/DepthEvalDataset/iPadPro12_5gen_iOS15";
 fn run(name: &str, method: Method) -> Option<Audit> {
     let path = data(name)?;
     let recording = Recording::open(path, &Limits::default()).expect("opens");
-    Some(audit(&recording, &Options::new(method)).expect("audits"))
+    Some(audit(&recording, &Options::new(method), &Silent).expect("audits"))
 }
 
 fn finding(audit: &Audit, code: Code) -> &Finding {
@@ -36,9 +38,9 @@ fn focal_lengths_as_the_paper() {
         [(IPHONE, 436.4965, 434.10), (IPAD4, 595.33997, 602.29), (IPAD5, 565.12317, 529.80)]
     {
         let Some(audit) = run(name, Method::Paper) else { return };
-        let focal_px = audit.calibration.expect("calibrates").focal_px().value;
+        let focal_px = audit.measured.calibration.expect("calibrates").focal_px().value;
         assert!((focal_px / expected_px - 1.0).abs() < 0.005, "{name}: {focal_px} px");
-        assert_eq!(audit.factory.expect("factory").intrinsics.fx, factory_px, "{name}");
+        assert_eq!(audit.measured.factory.expect("factory").intrinsics.fx, factory_px, "{name}");
     }
 }
 
@@ -69,8 +71,9 @@ fn ipad_5th_generation_has_a_wrong_focal_length() {
     assert!((value + 6.1).abs() < 0.3 && sigma < 0.2, "{focal:?}");
     assert_eq!(audit.distortion_state, StreamState::Rectified);
     // With its own focal length the sensor is right: the paper's 14 mm were the focal length's.
-    let factory_m = audit.factory_depth.and_then(|d| d.mean_of_medians_m).expect("depth").value;
-    let own_m = audit.own_depth.and_then(|d| d.mean_of_medians_m).expect("depth").value;
+    let factory_m =
+        audit.measured.factory_depth.and_then(|d| d.mean_of_medians_m).expect("depth").value;
+    let own_m = audit.measured.own_depth.and_then(|d| d.mean_of_medians_m).expect("depth").value;
     assert!(factory_m > 0.013 && own_m.abs() < 0.0025, "{factory_m} m, {own_m} m");
 }
 

@@ -2,7 +2,8 @@
 
 use truedepth::{
     board::CharucoBoard,
-    recording::{Limits, Problem, Recording, discover},
+    files::Limits,
+    recording::{Problem, Recording, discover},
 };
 
 use crate::data;
@@ -70,7 +71,7 @@ fn shared_recordings_read() {
                 "{folder}: {}",
                 near[near.len() / 2]
             );
-            assert_eq!(recording.rgb(i).unwrap().to_gray(), gray);
+            assert_eq!(recording.color(i).unwrap().to_gray(), gray);
         }
         let times: Vec<i64> = recording.frames.iter().map(|frame| frame.t_ns).collect();
         assert!(times[0] == 0 && times.is_sorted());

@@ -1,7 +1,8 @@
 //! The paper from its published data.
 
 use truedepth::{
-    recording::{Limits, discover_nested},
+    files::Limits,
+    recording::discover_nested,
     report::{PaperPictures, paper_page},
     reproduce::{Data, Reproduction, Status, reproduce},
 };

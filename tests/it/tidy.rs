@@ -28,8 +28,8 @@ const FORBIDDEN: &[(&str, &[&str], &str)] = &[
     ("std::thread", &[], "threads come from `par`"),
     ("rayon", &["par"], "threads come from `par`"),
     ("feature = \"parallel\"", &["par"], "what runs on one core runs on all, by `par`"),
-    ("std::fs", &["recording"], "only `recording` opens files"),
-    ("File::", &["recording"], "only `recording` opens files"),
+    ("std::fs", &["files"], "only `files` opens files"),
+    ("File::", &["files"], "only `files` opens files"),
     ("super::super", &[], "say `crate::room::...`, so that the order of rooms can be checked"),
     (
         "Serialize",
@@ -264,10 +264,10 @@ fn transcendental_functions_come_from_math() {
     assert_eq!(seen, [(1, "sin".to_owned()), (2, "exp".to_owned()), (3, "powi".to_owned())]);
 }
 
-/// A file of `recording` that opens files stands behind the feature, by its `mod` line or by an attribute inside.
+/// A file of `files` that opens files stands behind the feature, by its `mod` line or by an attribute inside.
 #[test]
 fn files_are_opened_only_behind_the_feature() {
-    let room = root().join("src/recording");
+    let room = root().join("src/files");
     let door = read(&room.join("mod.rs"));
     let mut faults = Vec::new();
     for path in rust_files(&room) {

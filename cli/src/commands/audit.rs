@@ -5,9 +5,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use indicatif::ProgressBar;
 use truedepth::{
-    audit::{Audit, Method, Options, Progress, Witness, audit_watched},
+    audit::{Audit, Options, audit},
     image::Rgb,
+    measure::{FrameMeasurement, Method, Observer, Progress},
     recording::{Found, Recording},
     report::{self, Overview, Pictures, Thumbnails, Typed, wire},
 };
@@ -180,16 +182,34 @@ fn watched(
     terminal: &Terminal,
 ) -> Result<Audit, Failure> {
     let bar = terminal.progress(&recording.name, recording.frames.len());
-    let observer = |Progress { stage, done, total }| {
-        bar.set_message(format!("{}: {}", recording.name, stage.name()));
-        bar.set_length(total as u64);
-        bar.set_position(done as u64);
-    };
-    let see = thumbnails.map(|thumbnails| |frame, image: &Rgb| thumbnails.see(frame, image));
-    let witness = see.as_ref().map(|see| see as Witness<'_>);
-    let audit = audit_watched(recording, options, &observer, witness);
+    let result = audit(recording, options, &Watch { recording, bar: &bar, thumbnails });
     bar.finish_and_clear();
-    Ok(audit?)
+    Ok(result?)
+}
+
+/// Moves the progress bar, and makes small photos.
+struct Watch<'a> {
+    recording: &'a Recording,
+    bar: &'a ProgressBar,
+    thumbnails: Option<&'a Thumbnails>,
+}
+
+impl Observer for Watch<'_> {
+    fn progress(&self, Progress { stage, done, total }: Progress) {
+        self.bar.set_message(format!("{}: {}", self.recording.name, stage.name()));
+        self.bar.set_length(total as u64);
+        self.bar.set_position(done as u64);
+    }
+
+    fn begins(&self, _: usize) -> bool {
+        self.thumbnails.is_some_and(Thumbnails::wants_all)
+    }
+
+    fn looked(&self, frame: usize, _: &FrameMeasurement, image: Option<&Rgb>) {
+        if let (Some(thumbnails), Some(image)) = (self.thumbnails, image) {
+            thumbnails.see(frame, image);
+        }
+    }
 }
 
 /// The report as a page, with the recording's images.

@@ -2,17 +2,15 @@
 
 use std::path::Path;
 
-use rayon::prelude::*;
 use truedepth::{
     board::CharucoBoard,
     calibrate::{
         self, FrameCorners, Input as Views, Method, Model, RollingShutter, calibrate_from,
         coverage, guess_intrinsics,
     },
-    detect::{Corner, Detector},
     export::{self, Format},
-    image::Gray,
-    recording::Factory,
+    measure::{Measurer, look_for_board},
+    recording::{Factory, Recording},
     report::{self, wire},
 };
 
@@ -22,7 +20,7 @@ use crate::{
     files::{Replace, write_together},
     input::{self, Input},
     outcome::Outcome,
-    terminal::Terminal,
+    terminal::{Bar, Terminal},
 };
 
 pub(crate) fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome, Failure> {
@@ -111,7 +109,8 @@ fn look(args: &CalibrateArgs, terminal: &Terminal) -> Result<Seen, Failure> {
         })
     };
     let place = args.recording.display().to_string();
-    match Input::at(&args.recording, &args.input)? {
+    let recording = match Input::at(&args.recording, &args.input)? {
+        Input::Image(file) => input::images(&place, vec![file], &args.input)?,
         Input::Recordings(found) => {
             let n = found.len();
             let mut found = found.into_iter();
@@ -119,60 +118,29 @@ fn look(args: &CalibrateArgs, terminal: &Terminal) -> Result<Seen, Failure> {
                 let message = format!("{place} holds {n} recordings; a calibration is of one");
                 return Err(Failure::new(message).hint("name one of them"));
             };
-            let recording = one.open()?;
-            let board = known(recording.board.as_ref(), recording.place())?;
-            let frames: Vec<usize> = (0..recording.frames.len())
-                .filter(|i| recording.frames[*i].color.is_some())
-                .collect();
-            let gray = |index: &usize| Ok(recording.gray(*index)?);
-            let n_images = frames.len();
-            let (frames, size_px) = corners(&recording.name, &board, &frames, terminal, gray)?;
-            let factory = recording.factory().cloned();
-            Ok(Seen { name: recording.name.clone(), board, factory, size_px, frames, n_images })
+            one.open()?
         }
-        Input::Images(files) => {
-            let board = known(None, &place)?;
-            let limits = input::limits(&args.input).image;
-            let gray = |index: &usize| {
-                let file = &files[*index];
-                Gray::decode(&input::read(file)?, &limits)
-                    .map_err(|e| Failure::from(e).within(format!("cannot read {}", file.display())))
-            };
-            let name =
-                args.recording.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            let all: Vec<usize> = (0..files.len()).collect();
-            let (frames, size_px) = corners(&name, &board, &all, terminal, gray)?;
-            Ok(Seen { name, board, factory: None, size_px, frames, n_images: all.len() })
-        }
-    }
+    };
+    let board = known(recording.board.as_ref(), recording.place())?;
+    let n_images = recording.frames.iter().filter(|frame| frame.color.is_some()).count();
+    let (frames, size_px) = corners(&recording, &board, terminal)?;
+    let factory = recording.factory().and_then(|factory| factory.at_size(size_px));
+    Ok(Seen { name: recording.name.clone(), board, factory, size_px, frames, n_images })
 }
 
-/// Columns and rows of an image, and its corners.
-type SizedCorners = ([usize; 2], Vec<Corner>);
-
-/// Decodes and searches all images; those of another size than the first are refused.
+/// Searches all images; those of another size than the first are refused.
 fn corners(
-    name: &str,
+    recording: &Recording,
     board: &CharucoBoard,
-    frames: &[usize],
     terminal: &Terminal,
-    gray: impl Fn(&usize) -> Result<Gray, Failure> + Sync,
 ) -> Result<(Vec<FrameCorners>, [usize; 2]), Failure> {
-    let detector = Detector::new(board);
-    let bar = terminal.progress(name, frames.len());
-    let found: Vec<Result<SizedCorners, Failure>> = frames
-        .par_iter()
-        .map(|index| {
-            let image = gray(index)?;
-            bar.inc(1);
-            Ok(([image.width(), image.height()], detector.detect(&image).corners))
-        })
-        .collect();
-    bar.finish_and_clear();
+    let name = &recording.name;
+    let bar = terminal.progress(name, recording.frames.len());
     let mut size_px = None;
     let mut seen = Vec::new();
-    for (frame, found) in frames.iter().zip(found) {
-        let (size, corners) = found?;
+    let searched = look_for_board(recording, &Measurer::new(board), &Bar(&bar), |frame, found| {
+        let found = found?;
+        let size = found.size_px.unwrap_or_default();
         let first = *size_px.get_or_insert(size);
         if size != first {
             return Err(Failure::new(format!(
@@ -181,10 +149,13 @@ fn corners(
             ))
             .hint("put images of one camera and one size into a folder of their own"));
         }
-        if !corners.is_empty() {
-            seen.push(FrameCorners { frame: *frame, corners });
+        if found.n_corners > 0 {
+            seen.push(FrameCorners { frame, corners: found.observation.corners });
         }
-    }
+        Ok(())
+    });
+    bar.finish_and_clear();
+    searched?;
     let size_px =
         size_px.ok_or_else(|| Failure::new(format!("{name}: there is no image in it")))?;
     Ok((seen, size_px))

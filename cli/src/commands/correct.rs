@@ -6,10 +6,12 @@ use std::{
 };
 
 use truedepth::{
-    audit::{Method, Options},
+    audit::Options,
     correct::{Plan, Progress, Reason, Sampling, Selection, Step, correct_observed},
     diagnose::{self, Api},
-    recording::{Recording, Sink, WholeFolder},
+    files::{AtomicFolder, Output},
+    measure::Method,
+    recording::Recording,
     report::{self, wire},
 };
 
@@ -29,7 +31,7 @@ pub(crate) fn run(args: &CorrectArgs, terminal: &Terminal) -> Result<Outcome, Fa
     refuse_inside(&args.output, &args.recording)?;
     let recording = Recording::open(&args.recording, &input::limits(&args.input))?;
     // A folder that must not be written is better known before the work than after.
-    let mut sink = WholeFolder::create(&args.output)?;
+    let mut sink = AtomicFolder::create(&args.output)?;
     let only: Vec<&str> = args.only.iter().map(String::as_str).collect();
     let asked = Asked {
         path: &args.recording,

@@ -3,8 +3,10 @@
 use std::sync::Arc;
 
 use truedepth::{
-    audit::{Method, Options},
-    recording::{Defect, Limits, Memory, Recording},
+    audit::Options,
+    files::{Limits, Memory},
+    measure::Method,
+    recording::{Defect, Recording},
     report::{self, Tone, Typed, wire},
     simulate::{Device, Faults, Plan, Truth},
 };
@@ -40,7 +42,7 @@ pub(crate) fn run(args: &DemoArgs, terminal: &Terminal) -> Result<Outcome, Failu
     let bar = terminal.progress("rendering", plan.n_frames);
     let memory = plan.write(Memory::new(DEVICE), |done| bar.set_position(done as u64))?;
     bar.finish_and_clear();
-    let recording = Recording::from_source(Arc::new(memory), &Limits::default())?;
+    let recording = Recording::from_files(Arc::new(memory), &Limits::default())?;
 
     terminal.say("auditing it as if nothing were known of it\n");
     let audit = observed(&recording, &Options::new(Method::Auto), terminal)?;

@@ -1,15 +1,16 @@
 //! `truedepth detect PATH...`
 
 use std::{
+    collections::BTreeMap,
     path::{Path, PathBuf},
+    sync::{Mutex, PoisonError},
     time::Instant,
 };
 
-use rayon::prelude::*;
 use truedepth::{
     board::CharucoBoard,
-    detect::Detector,
-    image::{Gray, Rgb},
+    image::Rgb,
+    measure::{FrameMeasurement, Measurer, Observer, Progress, look_for_board},
     recording::{Found, Recording},
     report::{
         self, Overlay,
@@ -23,7 +24,7 @@ use crate::{
     files::{OverlayFolder, Overwrite, write_atomically},
     input::{self, Input},
     outcome::Outcome,
-    terminal::Terminal,
+    terminal::{Bar, Terminal},
 };
 
 pub(crate) fn run(args: &DetectArgs, terminal: &Terminal) -> Result<Outcome, Failure> {
@@ -35,7 +36,7 @@ pub(crate) fn run(args: &DetectArgs, terminal: &Terminal) -> Result<Outcome, Fai
         args,
         terminal,
         overlays: folder.transpose()?,
-        detector: None,
+        measurer: None,
         images: Vec::new(),
         outcome: Outcome::Clean,
     };
@@ -43,7 +44,7 @@ pub(crate) fn run(args: &DetectArgs, terminal: &Terminal) -> Result<Outcome, Fai
     let mut alone = Vec::new();
     for path in &args.paths {
         match Input::at(path, &args.input) {
-            Ok(Input::Images(files)) => alone.extend(files),
+            Ok(Input::Image(file)) => alone.push(file),
             Ok(Input::Recordings(found)) => {
                 let before = search.images(std::mem::take(&mut alone));
                 search.or_go_on(before)?;
@@ -75,7 +76,7 @@ struct Search<'a> {
     terminal: &'a Terminal,
     overlays: Option<OverlayFolder>,
     /// That of the latest board: what it has prepared, and its memory, serve all images of that board.
-    detector: Option<Detector>,
+    measurer: Option<Measurer>,
     images: Vec<DetectedImage>,
     outcome: Outcome,
 }
@@ -95,36 +96,16 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Images of their own.
+    /// Images that were named one by one.
     fn images(&mut self, files: Vec<PathBuf>) -> Result<(), Failure> {
-        let Some(first) = files.first() else { return Ok(()) };
-        let first = first.display().to_string();
-        let board = self.board.ok_or_else(|| unknown_board(&first))?;
-        let what = if files.len() == 1 { first } else { "images".to_owned() };
-        let limits = input::limits(&self.args.input).image;
-        let images = files
-            .into_iter()
-            .map(|file| Image {
-                shown: file.display().to_string(),
-                overlay: self.overlays.as_mut().map(|folder| folder.place(&file)),
-                source: file,
-            })
-            .collect();
-        let decoded = |file: &Path, image: Result<_, truedepth::image::Error>| {
-            image.map_err(|e| Failure::from(e).within(format!("cannot read {}", file.display())))
+        let name = match files.as_slice() {
+            [] => return Ok(()),
+            [only] => only.display().to_string(),
+            _ => "images".to_owned(),
         };
-        self.all(
-            &what,
-            images,
-            board,
-            &Decode {
-                gray: |file: &PathBuf| decoded(file, Gray::decode(&input::read(file)?, &limits)),
-                rgb: |file: &PathBuf| {
-                    let bytes = input::read(file)?;
-                    Rgb::decode(&bytes, &limits).map_err(Failure::from)
-                },
-            },
-        );
+        let board = self.board.ok_or_else(|| unknown_board(&files[0].display().to_string()))?;
+        let recording = input::images(&name, files, &self.args.input)?;
+        self.recording(&recording, board);
         Ok(())
     }
 
@@ -141,114 +122,113 @@ impl Search<'_> {
         Ok(())
     }
 
+    /// Searches all colour images, side by side; what is found is kept in their order.
     fn recording(&mut self, recording: &Recording, board: &CharucoBoard) {
-        let frames = recording.frames.iter().enumerate();
-        let images = frames
-            .filter_map(|(index, frame)| {
-                let name = Path::new(frame.color.as_ref()?);
-                let short = name.file_name().unwrap_or_default().to_string_lossy();
-                let picture = format!("{}-{short}", recording.name);
-                Some(Image {
-                    shown: Path::new(recording.place()).join(name).display().to_string(),
-                    overlay: self.overlays.as_mut().map(|f| f.place(Path::new(&picture))),
-                    source: index,
-                })
-            })
-            .collect();
-        self.all(
-            &recording.name,
-            images,
-            board,
-            &Decode {
-                gray: |&index: &usize| Ok(recording.gray(index)?),
-                rgb: |&index: &usize| Ok(recording.rgb(index)?),
-            },
-        );
-    }
-
-    /// Searches all, side by side; what is found is kept in their order.
-    fn all<S, G, R>(
-        &mut self,
-        what: &str,
-        images: Vec<Image<S>>,
-        board: &CharucoBoard,
-        decode: &Decode<G, R>,
-    ) where
-        S: Sync,
-        G: Fn(&S) -> Result<Gray, Failure> + Sync,
-        R: Fn(&S) -> Result<Rgb, Failure> + Sync,
-    {
-        let detector = match self.detector.take() {
-            Some(detector) if detector.board() == board => detector,
-            _ => Detector::new(board),
+        let measurer = match self.measurer.take() {
+            Some(measurer) if measurer.board() == board => measurer,
+            _ => Measurer::new(board),
         };
-        let bar = self.terminal.progress(what, images.len());
-        let found: Vec<Result<DetectedImage, Failure>> = images
-            .par_iter()
-            .map(|image| {
-                let found = self.one(image, &detector, decode);
-                bar.inc(1);
-                found
+        let pictures: Vec<Option<PathBuf>> = recording
+            .frames
+            .iter()
+            .map(|frame| {
+                let file = &frame.color.as_ref()?.file;
+                let short = file.rsplit('/').next().unwrap_or(file);
+                let picture = match recording.format {
+                    "images" => short.to_owned(),
+                    _ => format!("{}-{short}", recording.name),
+                };
+                Some(self.overlays.as_mut()?.place(Path::new(&picture)))
             })
             .collect();
+        let bar = self.terminal.progress(&recording.name, recording.frames.len());
+        let times = Mutex::new(vec![[None; 3]; recording.frames.len()]);
+        let failed = Mutex::new(Vec::new());
+        let watch = Watch { bar: Bar(&bar), board, pictures: &pictures, times, failed };
+        let mut found = Vec::new();
+        let all = look_for_board(recording, &measurer, &watch, |frame, one| {
+            found.push((frame, one.map_err(Failure::from)));
+            Ok::<_, Failure>(())
+        });
         bar.finish_and_clear();
-        self.detector = Some(detector);
-        for image in found {
-            match image {
-                Ok(image) => self.images.push(image),
+        self.measurer = Some(measurer);
+        let times = watch.times.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let mut failed: BTreeMap<usize, Failure> =
+            watch.failed.into_inner().unwrap_or_else(PoisonError::into_inner).into_iter().collect();
+        for (frame, one) in found {
+            let one = failed.remove(&frame).map_or(one, Err);
+            match one {
+                Ok(one) => {
+                    let file = one.color.as_deref().unwrap_or_default();
+                    let shown = Path::new(recording.place()).join(file).display().to_string();
+                    let [width, height] = one.size_px.unwrap_or_default();
+                    let mut image =
+                        DetectedImage::new(shown, (width, height).into(), &one.observation);
+                    if let (true, [Some(start), Some(decoded), Some(looked)]) =
+                        (self.args.timings, times[frame])
+                    {
+                        image.decode_ms = Some(1e3 * (decoded - start).as_secs_f64());
+                        image.detect_ms = Some(1e3 * (looked - decoded).as_secs_f64());
+                    }
+                    self.images.push(image);
+                }
                 Err(failure) => self.failed(&failure),
             }
         }
+        if let Err(failure) = all {
+            self.failed(&failure);
+        }
+    }
+}
+
+/// Looks at the clock, and draws what was found.
+struct Watch<'a> {
+    bar: Bar<'a>,
+    board: &'a CharucoBoard,
+    /// Where to draw it, for each frame.
+    pictures: &'a [Option<PathBuf>],
+    /// Begun, decoded, looked at.
+    times: Mutex<Vec<[Option<Instant>; 3]>>,
+    /// Pictures that could not be written.
+    failed: Mutex<Vec<(usize, Failure)>>,
+}
+
+impl Watch<'_> {
+    fn mark(&self, frame: usize, step: usize) {
+        let now = Some(Instant::now());
+        self.times.lock().unwrap_or_else(PoisonError::into_inner)[frame][step] = now;
+    }
+}
+
+impl Observer for Watch<'_> {
+    fn progress(&self, progress: Progress) {
+        self.bar.progress(progress);
     }
 
-    /// Decodes and searches one image, looks at the clock, and draws.
-    fn one<S, G, R>(
-        &self,
-        image: &Image<S>,
-        detector: &Detector,
-        decode: &Decode<G, R>,
-    ) -> Result<DetectedImage, Failure>
-    where
-        G: Fn(&S) -> Result<Gray, Failure>,
-        R: Fn(&S) -> Result<Rgb, Failure>,
-    {
-        let start = Instant::now();
-        let gray = (decode.gray)(&image.source)?;
-        let decoded = Instant::now();
-        let observation = detector.detect(&gray);
-        let detected = Instant::now();
-        let size = (gray.width(), gray.height());
-        let mut found = DetectedImage::new(image.shown.clone(), size.into(), &observation);
-        if self.args.timings {
-            found.decode_ms = Some(1e3 * (decoded - start).as_secs_f64());
-            found.detect_ms = Some(1e3 * (detected - decoded).as_secs_f64());
+    fn begins(&self, frame: usize) -> bool {
+        self.mark(frame, 0);
+        self.pictures[frame].is_some()
+    }
+
+    fn decoded(&self, frame: usize) {
+        self.mark(frame, 1);
+    }
+
+    fn looked(&self, frame: usize, found: &FrameMeasurement, image: Option<&Rgb>) {
+        self.mark(frame, 2);
+        if let (Some(path), Some(image)) = (&self.pictures[frame], image) {
+            let size = (image.width(), image.height());
+            let overlay = Overlay::new(&found.observation, self.board, size);
+            if let Err(failure) = write_atomically(path, &overlay.draw(image).to_png()) {
+                self.failed.lock().unwrap_or_else(PoisonError::into_inner).push((frame, failure));
+            }
         }
-        if let Some(path) = &image.overlay {
-            let overlay = Overlay::new(&observation, detector.board(), size);
-            write_atomically(path, &overlay.draw(&(decode.rgb)(&image.source)?).to_png())?;
-        }
-        Ok(found)
     }
 }
 
 fn unknown_board(what: &str) -> Failure {
     Failure::new(format!("{what}: the board is not known"))
         .hint("say which with --board, like --board 10x8:20.875mm:10.4375mm:ARUCO_ORIGINAL")
-}
-
-/// One image to search.
-struct Image<S> {
-    /// As the output names it.
-    shown: String,
-    source: S,
-    /// Where to draw what was found.
-    overlay: Option<PathBuf>,
-}
-
-/// How to read an image: grey for the detector, in colour for people.
-struct Decode<G, R> {
-    gray: G,
-    rgb: R,
 }
 
 /// One line per image.

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use truedepth::{
     correct::{Plan, Selection},
-    recording::{Recording, WholeFolder},
+    files::AtomicFolder,
+    recording::Recording,
     report::{self, After, Animation, DepthPictures, DepthStyle, Drawn, Flip, Range, Shown, wire},
 };
 
@@ -24,7 +25,7 @@ pub(crate) fn run(args: &OverlayArgs, terminal: &Terminal) -> Result<Outcome, Fa
     refuse_inside(&args.output, &args.recording)?;
     let recording = Recording::open(&args.recording, &input::limits(&args.input))?;
     // A folder that must not be written is better known before the work than after.
-    let mut sink = WholeFolder::create(&args.output)?;
+    let mut sink = AtomicFolder::create(&args.output)?;
     let beside = Beside::new(args, &recording, terminal)?;
     let shown = if args.edges { Shown::Edges } else { Shown::Depth };
     let pictures = DepthPictures {

@@ -1,7 +1,7 @@
 //! `truedepth simulate -o REC`
 
 use truedepth::{
-    recording::FolderSink,
+    files::NewFolder,
     simulate::{Device, Faults, Plan},
 };
 
@@ -25,7 +25,7 @@ pub(crate) fn run(args: &SimulateArgs, terminal: &Terminal) -> Result<Outcome, F
     if let Some(board) = input::board(&args.board)? {
         plan.board = board;
     }
-    let sink = FolderSink::create(&args.output)?;
+    let sink = NewFolder::create(&args.output)?;
     let bar = terminal.progress("rendering", plan.n_frames);
     plan.write(sink, |done| bar.set_position(done as u64))?;
     bar.finish_and_clear();

@@ -2,7 +2,8 @@
 
 use truedepth::{
     correct::Rectifier,
-    recording::{Recording, WholeFolder},
+    files::AtomicFolder,
+    recording::Recording,
     report::{self, LensPictures, wire},
 };
 
@@ -13,7 +14,7 @@ pub(crate) fn run(args: &UndistortArgs, terminal: &Terminal) -> Result<Outcome, 
     refuse_inside(&args.output, &args.recording)?;
     let recording = Recording::open(&args.recording, &input::limits(&args.input))?;
     let rectifier = rectifier(args, &recording)?;
-    let mut sink = WholeFolder::create(&args.output)?;
+    let mut sink = AtomicFolder::create(&args.output)?;
     let board = input::board(&args.input.board)?.or_else(|| recording.board.clone());
     if board.is_none() {
         terminal

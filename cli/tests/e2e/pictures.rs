@@ -2,7 +2,7 @@
 
 use std::{ffi::OsStr, fs};
 
-use truedepth::{image::Rgb, recording::Limits};
+use truedepth::{files::Limits, image::Rgb};
 
 use crate::{
     scratch::{Scratch, files_of, names},

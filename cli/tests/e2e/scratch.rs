@@ -10,8 +10,9 @@ use std::{
 use truedepth::{
     board::CharucoBoard,
     camera::Intrinsics,
+    files::NewFolder,
     image::{DepthMap, Rgb},
-    recording::{Factory, FolderSink, Writer},
+    recording::{Factory, Writer},
 };
 
 /// A folder of one test's own, gone when dropped.
@@ -60,7 +61,7 @@ impl Scratch {
         };
         let color = Rgb::new(width, height, vec![[90, 120, 90]; width * height]);
         let depth = DepthMap::new(width, height, vec![0.3; width * height]);
-        let mut writer = Writer::new(FolderSink::create(&path).expect("a new folder"));
+        let mut writer = Writer::new(NewFolder::create(&path).expect("a new folder"));
         for timestamp in [1000, 1500, 2000] {
             writer.frame(timestamp, &color, &depth, &factory).expect("it can be written");
         }

@@ -7,8 +7,9 @@ use super::{
     zips::{good_zip, read_zip},
 };
 use crate::{
+    files::{Limits, Memory},
     image::{self, DepthMap, Gray},
-    recording::{Limits, Memory},
+    recording::FrameImage,
 };
 
 #[test]
@@ -130,9 +131,7 @@ fn bad_metadata_is_an_error_with_place_and_remedy() {
 #[test]
 fn cut_metadata_names_the_record() {
     let json = text(&good(), "DepthMetadata.json");
-    for (n, record) in
-        [(json.len() / 2, 2), (json.len() * 5 / 6, 3), (json.len() - 2, 4), (1, 1), (0, 1)]
-    {
+    for (n, record) in [(json.len() / 2, 2), (json.len() * 5 / 6, 3), (1, 1), (0, 1)] {
         let mut memory = good();
         memory.insert("DepthMetadata.json", &json.as_bytes()[..n]);
         let expected =
@@ -160,28 +159,32 @@ fn images_that_do_not_fit() {
     assert_message(&with("depth_54692.png", Vec::new()), &["rec/depth_54692.png", "truncated"]);
     assert_message(&with("rgb_54692.png", b"GIF89a".to_vec()), &["rec/rgb_54692.png", "PNG"]);
     let small = DepthMap::new(16, 12, vec![1.0; 16 * 12]).to_png(1e-4);
-    let said = [
-        "rec/depth_54692.png is 16x12 pixels, but DepthMetadata.json says 32x24 for timestamp 54692",
-    ];
+    let said =
+        ["rec/depth_54692.png is 16x12 pixels, but DepthMetadata.json says 32x24 for frame 54692"];
     assert_message(&with("depth_54692.png", small), &said);
     let small = Gray::new(16, 12, vec![1; 16 * 12]).to_png();
-    let said = [
-        "rec/rgb_54692.png is 16x12 pixels, but CameraMetadata.json says 32x24 for timestamp 54692",
-    ];
+    let said =
+        ["rec/rgb_54692.png is 16x12 pixels, but CameraMetadata.json says 32x24 for frame 54692"];
     assert_message(&with("rgb_54692.png", small), &said);
     assert_message(
         &with("depth_54692.png", color(0).to_png()),
         &["rec/depth_54692.png", "16-bit grey"],
     );
-    // The colour camera's own metadata allow another size, but the intrinsics do not.
+    // Colour and depth may differ in size: each has its own parameters.
     let mut memory = replaced("CameraMetadata.json", "\"Width\" : 32", "\"Width\" : 16");
     let json = text(&memory, "CameraMetadata.json");
     memory.insert("CameraMetadata.json", json.replacen("\"Height\" : 24", "\"Height\" : 12", 1));
     memory.insert("rgb_53692.png", Gray::new(16, 12, vec![1; 16 * 12]).to_png());
-    let error = open(memory).unwrap().gray(0).unwrap_err();
-    assert_message(
-        &error,
-        &["rec/rgb_53692.png is 16x12 pixels, but DepthMetadata.json says 32x24"],
+    let recording = open(memory).unwrap();
+    assert_eq!(recording.gray(0).unwrap().width(), 16);
+    let frame = &recording.frames[0];
+    let of = |image: &Option<FrameImage>| image.as_ref().unwrap().factory.clone().unwrap();
+    let (color, depth) = (of(&frame.color), of(&frame.depth));
+    assert_eq!((color.size(), depth.size()), ([16, 12], [32, 24]));
+    assert_eq!(color.intrinsics.fx, depth.intrinsics.fx / 2.0);
+    assert_eq!(
+        color.tables.as_ref().unwrap().inverse.max_radius_px,
+        depth.tables.as_ref().unwrap().inverse.max_radius_px / 2.0
     );
     let limits = Limits { image: image::Limits { pixels: 700 }, ..Limits::default() };
     let error = read_all(Arc::new(good()), &limits).unwrap_err();
@@ -201,10 +204,16 @@ fn not_a_recording() {
         &error,
         &["rec is not a recording", looked_for, "found nothing at all", "a .zip of it"],
     );
-    memory.insert("holiday.jpg", *b"x");
-    memory.insert("more/holiday.jpg", *b"x");
+    memory.insert("holiday.gif", *b"x");
+    memory.insert("more/holiday.gif", *b"x");
     memory.insert("notes", *b"x");
-    assert_message(&open(memory).unwrap_err(), &["found 3 files (2 jpg, 1 no extension)"]);
+    assert_message(&open(memory.clone()).unwrap_err(), &["found 3 files (2 gif, 1 no extension)"]);
+    // Photos alone are a format of their own.
+    memory.insert("b.JPG", *b"x");
+    memory.insert("a.png", *b"x");
+    let photos = open(memory).unwrap();
+    assert_eq!(photos.format, "images");
+    assert_eq!(photos.frames.iter().map(|f| f.id.as_str()).collect::<Vec<_>>(), ["a.png", "b.JPG"]);
     let mut memory = Memory::new("rec");
     memory.insert("DepthMetadata.json", *b"[]");
     assert_message(

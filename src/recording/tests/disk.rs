@@ -3,7 +3,10 @@
 use std::{fs, path::PathBuf, thread};
 
 use super::{TIMES, assert_message, color, depth, factory, zips::good_zip};
-use crate::recording::{FolderSink, Limits, Recording, Writer, discover};
+use crate::{
+    files::{Limits, NewFolder},
+    recording::{Recording, Writer, discover},
+};
 
 /// A new folder, removed at the end.
 struct Scratch(PathBuf);
@@ -25,7 +28,7 @@ impl Drop for Scratch {
 }
 
 fn write(path: &std::path::Path) {
-    let mut writer = Writer::new(FolderSink::create(path).unwrap());
+    let mut writer = Writer::new(NewFolder::create(path).unwrap());
     for (i, t) in TIMES.into_iter().enumerate() {
         writer.frame(t, &color(i), &depth(i), &factory()).unwrap();
     }
@@ -39,7 +42,7 @@ fn folders_and_zips_on_disk() {
     write(&scratch.0.join("one"));
     let one = Recording::open(scratch.0.join("one"), &limits).unwrap();
     assert_eq!((one.name.as_str(), one.frames.len()), ("one", 3));
-    assert_eq!(one.rgb(0).unwrap(), color(0));
+    assert_eq!(one.color(0).unwrap(), color(0));
     assert_eq!(Recording::open(&scratch.0, &limits).unwrap().name, "one");
 
     fs::write(scratch.0.join("zipped.zip"), good_zip()).unwrap();
@@ -62,7 +65,7 @@ fn folders_and_zips_on_disk() {
     let error = Recording::open(&scratch.0, &limits).unwrap_err();
     assert_message(&error, &["folders holds 2 recordings (one, two): name one"]);
     // Nothing is overwritten.
-    let error = FolderSink::create(&scratch.0.join("two")).unwrap_err();
+    let error = NewFolder::create(&scratch.0.join("two")).unwrap_err();
     assert_message(&error, &["two: the folder is not empty; name a new one"]);
 }
 

@@ -7,10 +7,11 @@ mod zips;
 
 use std::sync::Arc;
 
-use super::{Error, Factory, Limits, Memory, Problem, Recording, Source, Writer, discover_in};
+use super::{Error, Factory, Problem, Recording, Writer, discover_in};
 use crate::{
     board::CharucoBoard,
     camera::{Intrinsics, RadialTable, TablePair},
+    files::{Files, Limits, Memory},
     geom::Pixel,
     image::{DepthMap, Rgb},
 };
@@ -64,8 +65,7 @@ const TIMES: [i64; 3] = [53692, 54692, 55192];
 
 fn good() -> Memory {
     let mut writer = Writer::new(Memory::new("rec"));
-    // Written out of order: the metadata are in order all the same.
-    for (i, t) in TIMES.into_iter().enumerate().rev() {
+    for (i, t) in TIMES.into_iter().enumerate() {
         writer.frame(t, &color(i), &depth(i), &factory()).unwrap();
     }
     writer.board(&CharucoBoard::paper(0.020875).unwrap()).unwrap();
@@ -73,15 +73,15 @@ fn good() -> Memory {
 }
 
 fn open(memory: Memory) -> Result<Recording, Error> {
-    Recording::from_source(Arc::new(memory), &Limits::default())
+    Recording::from_files(Arc::new(memory), &Limits::default())
 }
 
 /// Opens a recording and decodes all of it.
-fn read_all(source: Arc<dyn Source>, limits: &Limits) -> Result<Recording, Error> {
-    let recording = Recording::from_source(source, limits)?;
+fn read_all(source: Arc<dyn Files>, limits: &Limits) -> Result<Recording, Error> {
+    let recording = Recording::from_files(source, limits)?;
     for (i, frame) in recording.frames.iter().enumerate() {
         if frame.color.is_some() {
-            recording.rgb(i)?;
+            recording.color(i)?;
             recording.gray(i)?;
         }
         if frame.depth.is_some() {
@@ -105,7 +105,7 @@ fn replaced(name: &str, from: &str, to: &str) -> Memory {
 }
 
 #[track_caller]
-fn assert_message(error: &Error, parts: &[&str]) {
+fn assert_message(error: &impl ToString, parts: &[&str]) {
     let message = error.to_string();
     for part in parts {
         assert!(message.contains(part), "no `{part}` in: {message}");
@@ -119,15 +119,18 @@ fn what_is_written_reads_back() {
     assert_eq!(recording.name, "rec");
     assert_eq!(recording.problems, []);
     assert!(recording.board == Some(CharucoBoard::paper(0.020875).unwrap()));
-    assert_eq!(recording.frames.iter().map(|f| f.timestamp).collect::<Vec<_>>(), TIMES);
+    assert_eq!(
+        recording.frames.iter().map(|f| f.id.as_str()).collect::<Vec<_>>(),
+        ["53692", "54692", "55192"]
+    );
     assert_eq!(recording.frames[1].t_ns, 1_000_000_000);
     for i in 0..3 {
-        assert_eq!(recording.rgb(i).unwrap(), color(i));
+        assert_eq!(recording.color(i).unwrap(), color(i));
         assert_eq!(recording.gray(i).unwrap(), color(i).to_gray());
         for (a, b) in recording.depth(i).unwrap().depth_m().iter().zip(depth(i).depth_m()) {
             assert!(a == b || (a.is_nan() && b.is_nan()) || (a - b).abs() < 1e-7, "{a} {b}");
         }
-        let (read, written) = (recording.frames[i].factory.as_ref().unwrap(), factory());
+        let (read, written) = (recording.frames[i].factory().unwrap(), factory());
         // Texts, counts and what is not scaled come back to the last bit.
         assert_eq!(read.intrinsics, written.intrinsics);
         assert_eq!(read.reference_dimensions, written.reference_dimensions);
@@ -156,24 +159,44 @@ fn what_is_written_reads_back() {
         }
     }
     // Frames of which the metadata say the same share it: it is longer than all else that is kept of a frame.
-    let said: Vec<_> = recording.frames.iter().map(|f| f.factory.as_ref().unwrap()).collect();
-    assert!(said.windows(2).all(|pair| Arc::ptr_eq(pair[0], pair[1])));
+    let images = recording.frames.iter().flat_map(|f| [&f.color, &f.depth]).flatten();
+    let said: Vec<_> = images.map(|image| image.factory.as_ref().unwrap()).collect();
+    assert!(said.len() == 6 && said.windows(2).all(|pair| Arc::ptr_eq(pair[0], pair[1])));
     // A second writing changes nothing any more.
     let mut writer = Writer::new(Memory::new("rec"));
     for (i, frame) in recording.frames.iter().enumerate() {
-        let factory = frame.factory.as_ref().unwrap();
+        let factory = frame.factory().unwrap();
         writer
-            .frame(
-                frame.timestamp,
-                &recording.rgb(i).unwrap(),
-                &recording.depth(i).unwrap(),
-                factory,
-            )
+            .frame(TIMES[i], &recording.color(i).unwrap(), &recording.depth(i).unwrap(), factory)
             .unwrap();
     }
     let again = writer.finish().unwrap();
     assert_eq!(again.get("rgb_53692.png"), good().get("rgb_53692.png"));
     assert_eq!(again.get("depth_53692.png"), good().get("depth_53692.png"));
+}
+
+/// An app that is killed while it records leaves whole frames and no end of the metadata.
+#[test]
+fn a_writer_that_is_killed_leaves_whole_frames() {
+    let mut writer = Writer::new(Memory::new("rec"));
+    for (i, t) in TIMES.into_iter().enumerate() {
+        writer.frame(t, &color(i), &depth(i), &factory()).unwrap();
+        let so_far = writer.output().clone();
+        let recording = read_all(Arc::new(so_far), &Limits::default()).unwrap();
+        assert_eq!(recording.frames.len(), i + 1);
+        assert!(recording.frames.iter().all(|frame| frame.factory() == Some(&factory())));
+        let unfinished = |file| Problem::MetadataUnfinished { file };
+        assert_eq!(
+            recording.problems,
+            ["DepthMetadata.json", "CameraMetadata.json"].map(unfinished),
+            "said, and nothing else is odd"
+        );
+    }
+    // Stopped in the middle of a record: that is still an error with its place.
+    let mut cut = writer.output().clone();
+    let whole = text(&cut, "DepthMetadata.json");
+    cut.insert("DepthMetadata.json", &whole.as_bytes()[..whole.len() - 30]);
+    assert_message(&open(cut).unwrap_err(), &["ends in the middle of record 3"]);
 }
 
 #[test]
@@ -215,9 +238,9 @@ fn pairing_problems_are_listed() {
         files.insert(name.clone(), bytes.clone());
     }
     let recording = read_all(Arc::new(files), &Limits::default()).unwrap();
-    let times: Vec<i64> = recording.frames.iter().map(|frame| frame.timestamp).collect();
+    let times: Vec<i64> = recording.frames.iter().map(|f| f.id.parse().unwrap()).collect();
     assert_eq!(times, [1, 53692, 54692, 99999]);
-    assert!(recording.frames[0].factory.is_none());
+    assert!(recording.frames[0].factory().is_none());
     assert_eq!(recording.factory().unwrap().intrinsics, factory().intrinsics);
     let lonely = vec![1, 99999];
     let unmatched = |file| Problem::ImagesWithoutMetadata { file, timestamps: lonely.clone() };
@@ -266,7 +289,7 @@ fn metadata_problems_are_listed() {
             },
         ]
     );
-    assert_eq!(recording.frames[2].factory.as_ref().unwrap().intrinsics.fx, 28.257);
+    assert_eq!(recording.frames[2].factory().unwrap().intrinsics.fx, 28.257);
 
     for (from, to, expected) in [
         (
@@ -288,7 +311,7 @@ fn metadata_problems_are_listed() {
         let recording = open(replaced("DepthMetadata.json", from, to)).unwrap();
         assert_eq!(recording.problems.len(), 1, "{to}");
         assert!(recording.problems[0].to_string().contains(expected), "{}", recording.problems[0]);
-        assert_eq!(recording.frames[0].factory.as_ref().unwrap().tables, None, "{to}");
+        assert_eq!(recording.frames[0].factory().unwrap().tables, None, "{to}");
     }
 
     for (name, missing) in [("DepthMetadata.json", true), ("CameraMetadata.json", false)] {

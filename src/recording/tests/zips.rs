@@ -9,7 +9,10 @@ use std::{
 use zip::{ZipWriter, write::SimpleFileOptions};
 
 use super::{assert_message, color, good, open, read_all};
-use crate::recording::{Archive, Error, Limits, Recording};
+use crate::{
+    files::{Archive, Limits},
+    recording::{Error, Recording},
+};
 
 /// A zip of these files, some of them as links.
 fn zip<'a>(files: impl IntoIterator<Item = (&'a str, &'a [u8])>) -> Vec<u8> {
@@ -47,7 +50,7 @@ fn zips_read_as_folders_do() {
     assert_eq!((zipped.name.as_str(), zipped.place()), ("a", "a.zip"));
     assert_eq!(zipped.frames, plain.frames);
     assert_eq!(zipped.problems, []);
-    assert_eq!(zipped.rgb(1).unwrap(), plain.rgb(1).unwrap());
+    assert_eq!(zipped.color(1).unwrap(), plain.color(1).unwrap());
     // From several threads at once.
     thread::scope(|scope| {
         for _ in 0..4 {

@@ -10,10 +10,11 @@ use super::{
     heat::{BAR_HEIGHT, Heat, Ramp, Tile},
 };
 use crate::{
-    audit::{Audit, FrameAudit},
+    audit::Audit,
     camera::{Camera, Distortion},
     depth::{BoardDepth, FrameDepth},
     geom::{Pixel, Point},
+    measure::FrameMeasurement,
     pose::View,
     report::{
         svg::{WIDTH, n},
@@ -306,7 +307,7 @@ fn outline(audit: &Audit, view: &View, camera: &Camera) -> Option<[Pixel; 4]> {
 }
 
 /// Place, noise (mm) and depth (m) of a frame's patches inside the outline.
-fn noise_of(frame: &FrameAudit, outline: &[Pixel; 4]) -> Vec<(Pixel, f64, f64)> {
+fn noise_of(frame: &FrameMeasurement, outline: &[Pixel; 4]) -> Vec<(Pixel, f64, f64)> {
     let side = |a: Pixel, b: Pixel, p: Pixel| (b.x - a.x) * (p.y - a.y) - (b.y - a.y) * (p.x - a.x);
     let inside = |p: Pixel| {
         let sides: [f64; 4] = std::array::from_fn(|i| side(outline[i], outline[(i + 1) % 4], p));

@@ -4,12 +4,13 @@ use maud::{Markup, PreEscaped, html};
 use serde::Serialize;
 
 use crate::{
-    audit::{Audit, FrameAudit},
+    audit::Audit,
     calibrate::Estimate,
     camera::{Camera, Distortion},
     correct::{Plan, Selection},
     depth::{BoardDepth, MAX_ERROR_M},
     geom::{Board, Color, Pixel, Pose},
+    measure::FrameMeasurement,
     pose::View,
     report::{
         figures::Table,
@@ -135,7 +136,7 @@ struct Case<'a> {
     camera: Camera,
     corrected: Corrected,
     depth: Option<&'a BoardDepth>,
-    view: fn(&FrameAudit) -> Option<&View>,
+    view: fn(&FrameMeasurement) -> Option<&View>,
 }
 
 fn cases(audit: &Audit) -> Vec<Case<'_>> {

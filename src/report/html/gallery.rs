@@ -3,14 +3,15 @@
 use maud::{Markup, PreEscaped, html};
 
 use crate::{
-    audit::{Audit, FrameAudit},
+    audit::Audit,
+    measure::FrameMeasurement,
     par,
     report::{overlay::Overlay, photo::Photo, pictures::rms_px, svg::n, words},
 };
 
 /// Images with corners, ids, markers and rejects over them; nothing where there are no photos of known frames.
 pub(super) fn gallery(audit: &Audit, photos: &[Photo]) -> Option<Markup> {
-    let shown: Vec<(&Photo, &FrameAudit)> =
+    let shown: Vec<(&Photo, &FrameMeasurement)> =
         photos.iter().filter_map(|photo| Some((photo, audit.frames.get(photo.frame)?))).collect();
     if shown.is_empty() {
         return None;
@@ -45,7 +46,7 @@ pub(super) fn gallery(audit: &Audit, photos: &[Photo]) -> Option<Markup> {
     })
 }
 
-fn picture(audit: &Audit, photo: &Photo, frame: &FrameAudit) -> Markup {
+fn picture(audit: &Audit, photo: &Photo, frame: &FrameMeasurement) -> Markup {
     let (width, height) = photo.size_px;
     let overlay = Overlay::new(&frame.observation, &audit.board, photo.size_px);
     let name = frame.color.clone().unwrap_or_else(|| format!("frame {}", photo.frame));

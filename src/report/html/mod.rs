@@ -331,10 +331,10 @@ mod tests {
     fn what_comes_from_a_file_is_text() {
         let mut audit = sample::audit();
         let evil = "<script>alert('\"&amp;')</script>";
-        audit.name = evil.to_owned();
+        audit.measured.name = evil.to_owned();
         audit.device.device_type = Some(evil.to_owned());
-        audit.no_calibration = Some(evil.to_owned());
-        for frame in &mut audit.frames {
+        audit.measured.no_calibration = Some(evil.to_owned());
+        for frame in &mut audit.measured.frames {
             frame.color = Some(evil.to_owned());
         }
         let page = page(&audit, &sample::pictures());
@@ -346,13 +346,13 @@ mod tests {
     #[test]
     fn nothing_known_is_a_page_too() {
         let mut audit = sample::audit();
-        audit.factory = None;
-        audit.calibration = None;
-        audit.camera = None;
-        audit.factory_depth = None;
-        audit.own_depth = None;
+        audit.measured.factory = None;
+        audit.measured.calibration = None;
+        audit.measured.camera = None;
+        audit.measured.factory_depth = None;
+        audit.measured.own_depth = None;
         audit.findings.clear();
-        audit.frames.clear();
+        audit.measured.frames.clear();
         let page = page(&audit, &Pictures::default());
         assert_well_formed(&page);
         assert!(page.contains("Nothing could be checked."));
@@ -361,7 +361,7 @@ mod tests {
     #[test]
     fn numbers_that_are_none_do_not_break_a_drawing() {
         let mut audit = sample::rich_audit();
-        let calibration = audit.calibration.as_mut().expect("the sample has one");
+        let calibration = audit.measured.calibration.as_mut().expect("the sample has one");
         for candidate in &mut calibration.candidates {
             candidate.held_out_rms_px = f64::NAN;
             candidate.focal_px.sigma = f64::INFINITY;
@@ -370,7 +370,7 @@ mod tests {
             view.residuals_px[0] = [f64::NAN, 0.0];
         }
         calibration.surface.as_mut().expect("the sample has one").heights_m[3] = f64::NAN;
-        let registration = audit.registration.as_mut().expect("the sample has one");
+        let registration = audit.measured.registration.as_mut().expect("the sample has one");
         registration.pattern.cells.iter_mut().for_each(|cell| cell.median_m = f64::NAN);
         for finding in &mut audit.findings {
             finding.value = Some(f64::NAN);

@@ -6,11 +6,12 @@ use serde::{Deserialize, Serialize};
 
 use super::{Calibration, finite};
 use crate::{
-    audit::{self, FrameAudit},
+    audit,
     board::{CharucoBoard, Layout},
     calibrate::Estimate,
     depth::{BoardDepth, FrameDepth, NoiseAtRange, Pattern},
     diagnose::{Device, Finding},
+    measure::FrameMeasurement,
     recording::{Defect, Factory},
 };
 
@@ -29,6 +30,8 @@ pub struct Audit {
     pub n_frames: usize,
     /// Frames in which the board was seen.
     pub n_frames_with_board: usize,
+    /// Those that are used: of more than 240 the ones whose views differ most.
+    pub n_frames_used: usize,
     /// What was odd in the files, in words.
     pub problems: Vec<String>,
     /// The own intrinsics; `null` where there are none.
@@ -310,8 +313,8 @@ pub struct EvidenceInfo {
 pub struct Frame {
     /// Index in the recording.
     pub frame: usize,
-    /// As written in the file.
-    pub timestamp: i64,
+    /// What people call it: in the capture app's recordings the timestamp, milliseconds.
+    pub id: String,
     /// Since the first frame.
     pub t_ns: i64,
     /// Name of the colour image inside the recording.
@@ -341,6 +344,7 @@ impl From<&audit::Audit> for Audit {
             board: Board::new(&audit.board, audit.layout),
             n_frames: audit.frames.len(),
             n_frames_with_board: audit.n_frames_with_board(),
+            n_frames_used: audit.n_frames_with_board() - audit.n_frames_summarised(),
             problems: audit.problems.iter().map(ToString::to_string).collect(),
             calibration: audit.calibration.as_ref().map(|calibration| {
                 Calibration::new(&audit.name, audit.method.name(), factory, calibration)
@@ -396,7 +400,7 @@ impl Witness {
 }
 
 /// What most views of the board say.
-fn mirrored(frames: &[FrameAudit]) -> Option<bool> {
+fn mirrored(frames: &[FrameMeasurement]) -> Option<bool> {
     let seen: Vec<bool> = frames
         .iter()
         .filter_map(|f| f.observation.identity.as_ref())
@@ -541,15 +545,15 @@ impl From<&Finding> for FindingInfo {
     }
 }
 
-impl From<(usize, &FrameAudit)> for Frame {
-    fn from((index, frame): (usize, &FrameAudit)) -> Self {
+impl From<(usize, &FrameMeasurement)> for Frame {
+    fn from((index, frame): (usize, &FrameMeasurement)) -> Self {
         Self {
             frame: index,
-            timestamp: frame.timestamp,
+            id: frame.id.clone(),
             t_ns: frame.t_ns,
             color: frame.color.clone(),
             depth: frame.depth.clone(),
-            n_corners: frame.observation.corners.len(),
+            n_corners: frame.n_corners,
             n_rejected: frame.observation.rejects.len(),
             factory_rms_px: frame.factory_view.as_ref().and_then(|view| finite(view.rms_px)),
             own_rms_px: frame.own_view.as_ref().and_then(|view| finite(view.rms_px)),

@@ -106,8 +106,9 @@ mod tests {
         correct::{BoardLine, Plan, Reason, Rectifier, Selection, Step},
         detect::Observation,
         diagnose,
+        files::Memory,
         geom::Pixel,
-        recording::{Defect, Memory},
+        recording::Defect,
         report::{
             After, Animation, DepthPictures, DepthStyle, Flip, LensPictures, Range, Shown, sample,
             to_json,
@@ -151,7 +152,7 @@ mod tests {
     #[test]
     fn a_known_camera_brings_its_covariance() {
         let audit = sample::audit();
-        let mut calibration = audit.calibration.unwrap();
+        let mut calibration = audit.measured.calibration.clone().unwrap();
         let sigmas: Vec<f64> = calibration.parameters.iter().map(|p| p.estimate.sigma).collect();
         let n = sigmas.len();
         calibration.covariance = (0..n * n)
@@ -283,7 +284,7 @@ mod tests {
     #[test]
     fn a_camera_comes_back() {
         let audit = sample::audit();
-        let mut calibration = audit.calibration.unwrap();
+        let mut calibration = audit.measured.calibration.clone().unwrap();
         let table = |sign: f64| {
             let magnification = (0..42).map(|i| sign * 1e-5 * f64::from(i * i)).collect();
             RadialTable::new(Pixel::new(320.5, 241.1), 400.25, magnification).unwrap()
@@ -346,7 +347,7 @@ mod tests {
     fn what_is_not_a_number_is_null() {
         let mut audit = sample::audit();
         audit.findings[1].sigma = Some(f64::NAN);
-        audit.frames[0].own_view.as_mut().unwrap().rms_px = f64::INFINITY;
+        audit.measured.frames[0].own_view.as_mut().unwrap().rms_px = f64::INFINITY;
         let json = to_json(&Document::Audit(Box::new(Audit::from(&audit))));
         assert!(json.contains("\"sigma\": null") && json.contains("\"own_rms_px\": null"));
         assert!(Document::from_json(&json).is_ok());

@@ -37,8 +37,8 @@ pub struct Overlay {
 pub struct OverlayFrame {
     /// Index of the frame.
     pub frame: usize,
-    /// As written in the recording.
-    pub timestamp: i64,
+    /// What people call it: in the capture app's recordings the timestamp, milliseconds.
+    pub id: String,
     /// The picture's name.
     pub file: String,
     /// Part of the depth map without depth: before, and after where there is one.
@@ -84,8 +84,8 @@ pub struct TreatmentsInfo {
 pub struct UndistortFrame {
     /// Index of the frame.
     pub frame: usize,
-    /// As written in the recording.
-    pub timestamp: i64,
+    /// What people call it: in the capture app's recordings the timestamp, milliseconds.
+    pub id: String,
     /// The picture's name.
     pub file: String,
     /// As in the whole.
@@ -98,7 +98,7 @@ impl Overlay {
         let millimetres = |m: f64| finite(1e3 * m);
         let frames = drawn.frames.iter().map(|f| OverlayFrame {
             frame: f.frame,
-            timestamp: f.timestamp,
+            id: f.id.clone(),
             file: f.file.clone(),
             holes_percent: f.holes.iter().map(|h| 100.0 * h).collect(),
             median_mm: f.median_m.iter().map(|m| millimetres(*m)).collect(),
@@ -143,7 +143,7 @@ impl Undistort {
     pub fn new(recording: &Recording, rectifier: &Rectifier, drawn: &LensDrawn) -> Self {
         let frames = drawn.frames.iter().map(|f| UndistortFrame {
             frame: f.frame,
-            timestamp: f.timestamp,
+            id: f.id.clone(),
             file: f.file.clone(),
             rms_px: f.rms_px.map(TreatmentsInfo::from),
         });

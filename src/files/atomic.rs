@@ -2,21 +2,21 @@
 
 use std::{
     fs::{self, File},
-    io,
-    path::{Component, Path, PathBuf},
+    io::{self, Write},
+    path::{Path, PathBuf},
 };
 
 use super::{
-    Error, Fill, Sink,
-    folder::{file_error, fill_file},
+    Error, Output,
+    folder::{append, create, file_error, not_empty, place_in},
 };
 
 /// A folder written under another name beside its place, and renamed when it is whole.
 ///
-/// Whoever is killed on the way leaves a hidden folder `.NAME.0.partial`, never half a folder NAME; the next
-/// `WholeFolder` of the same name removes it. Dropped without [`commit`](Self::commit), it leaves nothing.
+/// If the process is killed on the way, a hidden folder `.NAME.0.partial` stays, never half a folder NAME; the next
+/// `AtomicFolder` of the same name removes it. Dropped without [`commit`](Self::commit), it leaves nothing.
 #[derive(Debug)]
-pub struct WholeFolder {
+pub struct AtomicFolder {
     target: PathBuf,
     partial: PathBuf,
     /// Held as long as this process is at work: a partial folder whose lock is free is nobody's.
@@ -26,7 +26,7 @@ pub struct WholeFolder {
 const LOCK: &str = ".lock";
 const PARTIAL: &str = ".partial";
 
-impl WholeFolder {
+impl AtomicFolder {
     /// A folder to be, at `target`. Refused where that is there already, unless it is an empty folder.
     pub fn create(target: &Path) -> Result<Self, Error> {
         let fail = |why: &str| Error::File { file: target.display().to_string(), why: why.into() };
@@ -78,30 +78,20 @@ impl WholeFolder {
     }
 }
 
-impl WholeFolder {
-    /// Where a file of this name goes; the folders inside are made.
+impl AtomicFolder {
+    /// Where a file of this name goes.
     fn place(&self, name: &str) -> Result<PathBuf, Error> {
-        let inside = Path::new(name);
-        let path = self.partial.join(inside);
-        if name == LOCK || !inside.components().all(|part| matches!(part, Component::Normal(_))) {
-            let why = "not a name of a file inside a folder".to_owned();
-            return Err(Error::File { file: name.to_owned(), why });
-        }
-        if let Some(folder) = path.parent() {
-            fs::create_dir_all(folder).map_err(|e| file_error(folder, &e))?;
-        }
-        Ok(path)
+        place_in(&self.partial, if name == LOCK { "" } else { name })
     }
 }
 
-impl Sink for WholeFolder {
-    fn write(&mut self, name: &str, bytes: &[u8]) -> Result<(), Error> {
-        let path = self.place(name)?;
-        fs::write(&path, bytes).map_err(|e| file_error(&path, &e))
+impl Output for AtomicFolder {
+    fn create(&mut self, name: &str) -> Result<Box<dyn Write + '_>, Error> {
+        create(&self.place(name)?)
     }
 
-    fn stream(&mut self, name: &str, fill: &mut Fill<'_>) -> Result<(), Error> {
-        fill_file(&self.place(name)?, fill)
+    fn append(&mut self, name: &str, bytes: &[u8]) -> Result<(), Error> {
+        append(&self.place(name)?, bytes)
     }
 }
 
@@ -123,7 +113,7 @@ fn sync_all(folder: &Path) -> Result<(), Error> {
     sync_folder(folder).map_err(fail)
 }
 
-impl Drop for WholeFolder {
+impl Drop for AtomicFolder {
     fn drop(&mut self) {
         if self.lock.take().is_some() {
             // After an error; what cannot be removed now, the next run removes.
@@ -133,17 +123,18 @@ impl Drop for WholeFolder {
 }
 
 fn refuse_unless_free(target: &Path) -> Result<(), Error> {
-    let refuse =
-        |why: &str| Err(Error::File { file: target.display().to_string(), why: why.to_owned() });
     match fs::symlink_metadata(target) {
         Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(()),
         Err(e) => Err(file_error(target, &e)),
-        Ok(there) if !there.is_dir() => refuse("it is there already; name a new folder"),
+        Ok(there) if !there.is_dir() => Err(Error::Taken {
+            file: target.display().to_string(),
+            why: "it is there already; name a new folder".to_owned(),
+        }),
         Ok(_) => {
             let mut entries = fs::read_dir(target).map_err(|e| file_error(target, &e))?;
             match entries.next() {
                 None => Ok(()),
-                Some(_) => refuse("the folder is not empty; name a new one"),
+                Some(_) => Err(not_empty(target)),
             }
         }
     }

@@ -7,50 +7,39 @@ use serde::{
 };
 use serde_json::value::RawValue;
 
-use super::{
-    Error, Push, Recording, json,
-    write::tuple,
-    zeiss::{CAMERA_METADATA, DEPTH_METADATA},
+use super::{CAMERA_METADATA, DEPTH_METADATA, json, write::tuple};
+use crate::{
+    files::{self, Output},
+    recording::{Contents, Error, MetadataEdit},
 };
-use crate::camera::Intrinsics;
 
-/// What a frame's metadata say instead of what they said.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Amendment {
-    /// Intrinsics at the size of the depth map.
-    pub intrinsics: Option<Intrinsics>,
-    /// The images are rectified now: lookup tables become zero, so that whoever applies them does no harm, and
-    /// `GeometricDistortionCorrectionEnabled` becomes true.
-    pub rectified: bool,
-}
-
-impl Recording {
-    /// The metadata files that are there.
-    pub fn metadata_names(&self) -> Vec<&'static str> {
-        let names = self.file_names();
-        [DEPTH_METADATA, CAMERA_METADATA].into_iter().filter(|file| names.contains(file)).collect()
-    }
-
-    /// A metadata file as it is but for what `amend` says of each time (the timestamp as written), piece by piece.
-    pub fn amended_metadata(
-        &self,
-        file: &str,
-        amend: &dyn Fn(i64) -> Amendment,
-        push: &mut Push<'_>,
-    ) -> Result<(), Error> {
+/// Writes the metadata files as they are but for what `edit` says of each frame, one record at a time.
+pub(super) fn metadata(
+    contents: &Contents,
+    edit: &dyn Fn(&str) -> MetadataEdit,
+    output: &mut dyn Output,
+) -> Result<(), Error> {
+    let names = contents.names_here();
+    for file in [DEPTH_METADATA, CAMERA_METADATA].into_iter().filter(|file| names.contains(file)) {
+        let mut output = output.create(file)?;
+        let mut push = |bytes: &[u8]| {
+            output.write_all(bytes).map_err(|e| Error::Files(files::Error::io(file, &e)))
+        };
         let mut begun = false;
-        let whole = || self.file(file);
-        let reader = self.open_file(file)?;
-        json::each_record(&self.path(file), reader, whole, &mut |mut record: Record| {
+        let whole = || contents.read(file);
+        let reader = contents.open(file)?;
+        json::each_record(&contents.path(file), reader, whole, &mut |mut record: Record| {
             if let Some(timestamp) = record.timestamp() {
-                record.amend(&amend(timestamp));
+                record.edit(&edit(&timestamp.to_string()));
             }
             push(if begun { b"," } else { b"[\n" })?;
             begun = true;
             push(record.to_text().as_bytes())
         })?;
-        push(if begun { b"\n]\n" } else { b"[\n]\n" })
+        push(if begun { b"\n]\n" } else { b"[\n]\n" })?;
+        output.flush().map_err(|e| files::Error::io(file, &e))?;
     }
+    Ok(())
 }
 
 /// An object with the order of its keys and the text of its values.
@@ -62,14 +51,14 @@ impl Record {
     }
 
     /// Changes the values of keys that are there; none is added.
-    fn amend(&mut self, amendment: &Amendment) {
+    fn edit(&mut self, edit: &MetadataEdit) {
         for (key, value) in &mut self.0 {
-            match (key.as_str(), &amendment.intrinsics) {
+            match (key.as_str(), &edit.intrinsics) {
                 ("IntrinsicMatrix.0", Some(k)) => *value = tuple(&[k.fx, 0.0, k.cx]),
                 ("IntrinsicMatrix.1", Some(k)) => *value = tuple(&[0.0, k.fy, k.cy]),
                 _ => {}
             }
-            if amendment.rectified {
+            if edit.rectified {
                 match key.as_str() {
                     "GeometricDistortionCorrectionEnabled" => *value = "true".to_owned(),
                     "LensDistortionLookupTable" | "LensDistortionInverseLookupTable" => {
@@ -124,8 +113,10 @@ mod tests {
 
     use super::*;
     use crate::{
+        camera::Intrinsics,
+        files::{Limits, Memory},
         image::{DepthMap, Rgb},
-        recording::{Factory, Limits, Memory, Sink, Writer},
+        recording::{Factory, Recording, Writer},
     };
 
     #[test]
@@ -144,33 +135,31 @@ mod tests {
                     \"LensDistortionInverseLookupTable\" : [\n    -1e-3,\n    -2.50e-3\n  ],\n  \
                     \"Alpha \\\"q\\\"\" : 6.7641117311723065e-06,\n  \"Timestamp\" : 500\n}\n]\n";
         memory.insert(DEPTH_METADATA, text);
-        let recording = Recording::from_source(Arc::new(memory), &Limits::default()).unwrap();
+        let recording = Recording::from_files(Arc::new(memory), &Limits::default()).unwrap();
         assert!(recording.factory().unwrap().tables.is_some());
-        let amended = |file, amendment| {
+        let edited = |file, edit: MetadataEdit| {
             let mut memory = Memory::default();
-            let amend = &|_| amendment;
-            memory.stream(file, &mut |push| recording.amended_metadata(file, amend, push)).unwrap();
+            recording.images().rewrite_metadata(&|_| edit, &mut memory).unwrap();
             String::from_utf8(memory.get(file).unwrap().to_vec()).unwrap()
         };
-        assert_eq!(recording.metadata_names(), [DEPTH_METADATA, CAMERA_METADATA]);
-        assert_eq!(amended(DEPTH_METADATA, Amendment::default()), text);
+        assert_eq!(edited(DEPTH_METADATA, MetadataEdit::default()), text);
         assert_eq!(
-            amended(CAMERA_METADATA, Amendment::default()).as_bytes(),
+            edited(CAMERA_METADATA, MetadataEdit::default()).as_bytes(),
             recording.file(CAMERA_METADATA).unwrap()
         );
 
         let intrinsics = Some(Intrinsics { fx: 8.5, fy: 8.25, cx: 3.0, cy: 2.0, ..k });
-        let amended = amended(DEPTH_METADATA, Amendment { intrinsics, rectified: true });
+        let edited = edited(DEPTH_METADATA, MetadataEdit { intrinsics, rectified: true });
         for (from, to) in [
             ("(9.0, 0.0, 3.5)", "(8.5, 0.0, 3.0)"),
             ("(0.0, 9.0, 2.5)", "(0.0, 8.25, 2.0)"),
             ("    1e-3,\n    2.50e-3", "    0.0,\n    0.0"),
             ("    -1e-3,\n    -2.50e-3", "    0.0,\n    0.0"),
         ] {
-            assert!(text.contains(from) && amended.contains(to) && !amended.contains(from));
+            assert!(text.contains(from) && edited.contains(to) && !edited.contains(from));
         }
         assert!(
-            amended.contains("6.7641117311723065e-06") && amended.contains("{\"b\" : [1e0,  2]}")
+            edited.contains("6.7641117311723065e-06") && edited.contains("{\"b\" : [1e0,  2]}")
         );
     }
 }

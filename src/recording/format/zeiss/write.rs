@@ -1,102 +1,92 @@
 //! Recordings written in the format they are read from.
 
-use super::{
-    Error, Factory, board_to_toml,
-    zeiss::{BOARD, CAMERA_METADATA, DEPTH_METADATA, DEPTH_UNIT_M},
-};
+use super::{BOARD, CAMERA_METADATA, DEPTH_METADATA, DEPTH_UNIT_M};
 use crate::{
     board::{CharucoBoard, Dictionary},
+    files::{self, Output},
     image::{DepthMap, Rgb},
+    recording::{Factory, board_to_toml},
 };
-
-/// Where files are written to: a folder, memory, an upload.
-pub trait Sink {
-    /// Writes a whole file.
-    fn write(&mut self, name: &str, bytes: &[u8]) -> Result<(), Error>;
-
-    /// Writes a file of which `fill` hands over piece after piece, for what need not lie in memory as a whole.
-    fn stream(&mut self, name: &str, fill: &mut Fill<'_>) -> Result<(), Error> {
-        let mut whole = Vec::new();
-        fill(&mut |bytes| {
-            whole.extend_from_slice(bytes);
-            Ok(())
-        })?;
-        self.write(name, &whole)
-    }
-}
-
-/// Takes the next piece of a file.
-pub type Push<'a> = dyn FnMut(&[u8]) -> Result<(), Error> + 'a;
-
-/// Hands the pieces of a file over.
-pub type Fill<'a> = dyn FnMut(&mut Push<'_>) -> Result<(), Error> + 'a;
 
 /// Writes a recording frame by frame, metadata in the very spelling of the capture app, so that the programs of
 /// others read it too.
+///
+/// Metadata are appended as frames come: if the process is killed, the frames written so far can be read.
 #[derive(Debug)]
-pub struct Writer<S: Sink> {
-    sink: S,
-    depth_records: Vec<(i64, String)>,
-    camera_records: Vec<(i64, String)>,
+pub struct Writer<O: Output> {
+    output: O,
+    n_frames: usize,
 }
 
-impl<S: Sink> Writer<S> {
+impl<O: Output> Writer<O> {
     /// A recording without frames.
-    pub fn new(sink: S) -> Self {
-        Self { sink, depth_records: Vec::new(), camera_records: Vec::new() }
+    pub fn new(output: O) -> Self {
+        Self { output, n_frames: 0 }
     }
 
-    /// Adds a frame taken `timestamp` milliseconds after some beginning.
+    /// Adds a frame taken `t_ms` milliseconds after some beginning; both images have the size of
+    /// `factory.intrinsics`.
     pub fn frame(
         &mut self,
-        timestamp: i64,
+        t_ms: i64,
         color: &Rgb,
         depth: &DepthMap,
         factory: &Factory,
-    ) -> Result<(), Error> {
-        self.encoded_frame(timestamp, &color.to_png(), &encode_depth(depth), factory)
+    ) -> Result<(), files::Error> {
+        self.encoded_frame(t_ms, &color.to_png(), &encode_depth(depth), factory)
     }
 
-    /// Adds a frame whose images are PNG already: as they were read, or encoded on several threads. The depth image
-    /// must count 10⁻⁴ m ([`encode_depth`]), and both must have the size of `factory.intrinsics`.
+    /// As [`frame`](Self::frame), from images that are PNG already: as they were read, or encoded on several threads.
+    /// The depth image must count 10⁻⁴ m ([`encode_depth`]).
     pub fn encoded_frame(
         &mut self,
-        timestamp: i64,
+        t_ms: i64,
         color_png: &[u8],
         depth_png: &[u8],
         factory: &Factory,
-    ) -> Result<(), Error> {
-        self.sink.write(&format!("rgb_{timestamp}.png"), color_png)?;
-        self.sink.write(&format!("depth_{timestamp}.png"), depth_png)?;
-        self.depth_records.push((timestamp, depth_record(timestamp, factory)));
-        self.camera_records.push((timestamp, camera_record(timestamp, factory)));
-        Ok(())
+    ) -> Result<(), files::Error> {
+        self.output.write(&format!("rgb_{t_ms}.png"), color_png)?;
+        self.output.write(&format!("depth_{t_ms}.png"), depth_png)?;
+        self.metadata(t_ms, factory, factory.size())
+    }
+
+    /// Adds the metadata of a frame whose images were written to the [output](Self::output) under the names
+    /// `rgb_T.png` and `depth_T.png`: `factory` at the size of the depth map, and the size of the
+    /// colour image.
+    pub fn metadata(
+        &mut self,
+        t_ms: i64,
+        factory: &Factory,
+        color_size: [usize; 2],
+    ) -> Result<(), files::Error> {
+        let before = if self.n_frames == 0 { "[\n" } else { "," };
+        self.n_frames += 1;
+        let depth = format!("{before}{}", depth_record(t_ms, factory));
+        self.output.append(DEPTH_METADATA, depth.as_bytes())?;
+        let camera = format!("{before}{}", camera_record(t_ms, factory, color_size));
+        self.output.append(CAMERA_METADATA, camera.as_bytes())
     }
 
     /// Describes the board, in `board.toml`; a dictionary of one's own gets its file beside it.
-    pub fn board(&mut self, board: &CharucoBoard) -> Result<(), Error> {
+    pub fn board(&mut self, board: &CharucoBoard) -> Result<(), files::Error> {
         if Dictionary::is_file(board.dictionary.name()) {
-            self.sink
+            self.output
                 .write(board.dictionary.name(), board.dictionary.to_opencv_yaml().as_bytes())?;
         }
-        self.sink.write(BOARD, board_to_toml(board).as_bytes())
+        self.output.write(BOARD, board_to_toml(board).as_bytes())
     }
 
-    /// Adds any other file, like `truth.json`.
-    pub fn file(&mut self, name: &str, bytes: &[u8]) -> Result<(), Error> {
-        self.sink.write(name, bytes)
+    /// Where the recording is written to: for any other file, like `truth.json`.
+    pub fn output(&mut self) -> &mut O {
+        &mut self.output
     }
 
-    /// Writes the metadata, in order of time, and hands the sink back. Without it the recording is incomplete.
-    pub fn finish(mut self) -> Result<S, Error> {
-        for (file, records) in
-            [(DEPTH_METADATA, &mut self.depth_records), (CAMERA_METADATA, &mut self.camera_records)]
-        {
-            records.sort_by_key(|&(timestamp, _)| timestamp);
-            let records: Vec<&str> = records.iter().map(|(_, text)| text.as_str()).collect();
-            self.sink.write(file, format!("[\n{}\n]\n", records.join(",")).as_bytes())?;
-        }
-        Ok(self.sink)
+    /// Ends the metadata, and hands the output back. Without it they are read as far as they go.
+    pub fn finish(mut self) -> Result<O, files::Error> {
+        let end: &[u8] = if self.n_frames == 0 { b"[\n]\n" } else { b"\n]\n" };
+        self.output.append(DEPTH_METADATA, end)?;
+        self.output.append(CAMERA_METADATA, end)?;
+        Ok(self.output)
     }
 }
 
@@ -139,18 +129,18 @@ fn depth_record(timestamp: i64, factory: &Factory) -> String {
     record.finish()
 }
 
-fn camera_record(timestamp: i64, factory: &Factory) -> String {
+fn camera_record(timestamp: i64, factory: &Factory, [width, height]: [usize; 2]) -> String {
     let mut record = Record::default();
     if let Some(device) = &factory.device_type {
         record.entry("DeviceType", &serde_json::Value::from(device.as_str()).to_string());
     }
     let key = "GeometricDistortionCorrectionEnabled";
     record.bool(key, factory.geometric_distortion_correction);
-    record.number("Height", Some(factory.intrinsics.height));
+    record.number("Height", Some(height));
     record.number("Timestamp", Some(timestamp));
     record
         .number("VideoFieldOfView", factory.field_of_view_rad.map(|rad| Python(rad.to_degrees())));
-    record.number("Width", Some(factory.intrinsics.width));
+    record.number("Width", Some(width));
     record.finish()
 }
 

@@ -1,4 +1,4 @@
-//! What an untrusted recording may ask for.
+//! What untrusted files may ask for.
 
 use crate::image;
 

@@ -1,20 +1,19 @@
-//! Recordings on disk.
+//! Folders on disk.
 
 use std::{
-    fs::{self, File},
+    fs::{self, File, OpenOptions},
     io::{self, BufWriter, Read, Seek, SeekFrom, Write},
-    path::{Path, PathBuf},
+    path::{Component, Path, PathBuf},
     sync::{Arc, Mutex, PoisonError},
 };
 
-use super::{
-    Error, Fill, Limits, Sink, Source,
-    source::{join, too_long},
-    zeiss,
-};
+use super::{Error, Files, Limits, Output, join, too_long};
 
-/// How many folders deep recordings are looked for.
+/// How many folders deep files are listed.
 const MAX_DEPTH: usize = 4;
+
+/// Names that end so are files' names.
+const FILE_ENDINGS: [&str; 6] = [".png", ".jpg", ".jpeg", ".json", ".toml", ".txt"];
 
 /// A folder on disk and the folders in it, up to four deep. Links to folders are not followed, so that a loop does
 /// no harm.
@@ -47,8 +46,8 @@ impl Folder {
                 continue;
             }
             let is_folder = entry.file_type().map_err(fail)?.is_dir();
-            // A folder under the name of a file of ours must fail when it is read, not vanish.
-            if is_folder && !zeiss::is_ours(&name) {
+            // A folder under the name of a file must fail when that is read, not vanish.
+            if is_folder && !FILE_ENDINGS.iter().any(|end| name.ends_with(end)) {
                 folders.push(join(inside, &name));
             } else {
                 self.names.push(join(inside, &name));
@@ -70,7 +69,7 @@ impl Folder {
     }
 }
 
-impl Source for Folder {
+impl Files for Folder {
     fn place(&self) -> &str {
         &self.place
     }
@@ -80,27 +79,35 @@ impl Source for Folder {
     }
 
     fn read(&self, name: &str, max_bytes: u64) -> Result<Vec<u8>, Error> {
-        let path = self.path.join(name);
-        let (file, length) = open_file(&path)?;
-        let mut bytes = Vec::with_capacity(length.min(max_bytes) as usize + 1);
-        file.take(max_bytes.saturating_add(1))
-            .read_to_end(&mut bytes)
-            .map_err(|error| file_error(&path, &error))?;
-        if bytes.len() as u64 > max_bytes {
-            return Err(too_long(path.display().to_string(), max_bytes));
-        }
-        Ok(bytes)
+        read(&self.path.join(name), max_bytes)
     }
 
     fn open(&self, name: &str, max_bytes: u64) -> Result<Box<dyn Read + '_>, Error> {
-        let path = self.path.join(name);
-        let (file, length) = open_file(&path)?;
-        if length > max_bytes {
-            return Err(too_long(path.display().to_string(), max_bytes));
-        }
-        // It may grow while it is read.
-        Ok(Box::new(file.take(max_bytes)))
+        open(&self.path.join(name), max_bytes)
     }
+}
+
+/// The whole of a file on disk.
+pub(super) fn read(path: &Path, max_bytes: u64) -> Result<Vec<u8>, Error> {
+    let (file, length) = open_file(path)?;
+    let mut bytes = Vec::with_capacity(length.min(max_bytes) as usize + 1);
+    file.take(max_bytes.saturating_add(1))
+        .read_to_end(&mut bytes)
+        .map_err(|error| file_error(path, &error))?;
+    if bytes.len() as u64 > max_bytes {
+        return Err(too_long(path.display().to_string(), max_bytes));
+    }
+    Ok(bytes)
+}
+
+/// A file on disk from its beginning on.
+pub(super) fn open(path: &Path, max_bytes: u64) -> Result<Box<dyn Read>, Error> {
+    let (file, length) = open_file(path)?;
+    if length > max_bytes {
+        return Err(too_long(path.display().to_string(), max_bytes));
+    }
+    // It may grow while it is read.
+    Ok(Box::new(file.take(max_bytes)))
 }
 
 /// A file and its length.
@@ -115,48 +122,72 @@ fn open_file(path: &Path) -> Result<(File, u64), Error> {
     Ok((File::open(path).map_err(fail)?, metadata.len()))
 }
 
-/// A folder that is written to.
+/// A new folder that fills up file by file: what is written is there even if the process is killed.
 #[derive(Clone, Debug)]
-pub struct FolderSink {
+pub struct NewFolder {
     path: PathBuf,
 }
 
-impl FolderSink {
+impl NewFolder {
     /// Makes the folder, and those above it. Refused where it is already there and not empty: nothing is overwritten.
     pub fn create(path: &Path) -> Result<Self, Error> {
         fs::create_dir_all(path).map_err(|error| file_error(path, &error))?;
         let mut entries = fs::read_dir(path).map_err(|error| file_error(path, &error))?;
         if entries.next().is_some() {
-            return Err(Error::File {
-                file: path.display().to_string(),
-                why: "the folder is not empty; name a new one".into(),
-            });
+            return Err(not_empty(path));
         }
         Ok(Self { path: path.to_owned() })
     }
 }
 
-impl Sink for FolderSink {
-    fn write(&mut self, name: &str, bytes: &[u8]) -> Result<(), Error> {
-        let path = self.path.join(name);
-        fs::write(&path, bytes).map_err(|error| file_error(&path, &error))
+impl Output for NewFolder {
+    fn create(&mut self, name: &str) -> Result<Box<dyn Write + '_>, Error> {
+        create(&place_in(&self.path, name)?)
     }
 
-    fn stream(&mut self, name: &str, fill: &mut Fill<'_>) -> Result<(), Error> {
-        fill_file(&self.path.join(name), fill)
+    fn append(&mut self, name: &str, bytes: &[u8]) -> Result<(), Error> {
+        append(&place_in(&self.path, name)?, bytes)
     }
 }
 
-/// Writes a file piece by piece.
-pub(super) fn fill_file(path: &Path, fill: &mut Fill<'_>) -> Result<(), Error> {
-    let fail = |error| file_error(path, &error);
-    let mut file = BufWriter::new(File::create(path).map_err(fail)?);
-    fill(&mut |bytes| file.write_all(bytes).map_err(fail))?;
-    file.flush().map_err(fail)
+pub(super) fn not_empty(path: &Path) -> Error {
+    Error::Taken {
+        file: path.display().to_string(),
+        why: "the folder is not empty; name a new one".into(),
+    }
+}
+
+/// Where a file of this name goes in a folder; the folders inside are made.
+pub(super) fn place_in(folder: &Path, name: &str) -> Result<PathBuf, Error> {
+    let inside = Path::new(name);
+    if name.is_empty() || !inside.components().all(|part| matches!(part, Component::Normal(_))) {
+        let why = "not a name of a file inside a folder".to_owned();
+        return Err(Error::File { file: name.to_owned(), why });
+    }
+    let path = folder.join(inside);
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder).map_err(|e| file_error(folder, &e))?;
+    }
+    Ok(path)
+}
+
+/// Begins a file.
+pub(super) fn create(path: &Path) -> Result<Box<dyn Write>, Error> {
+    Ok(Box::new(BufWriter::new(File::create(path).map_err(|e| file_error(path, &e))?)))
+}
+
+/// Adds to the end of a file.
+pub(super) fn append(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    OpenOptions::new()
+        .create(true)
+        .append(true)
+        .open(path)
+        .and_then(|mut file| file.write_all(bytes))
+        .map_err(|e| file_error(path, &e))
 }
 
 pub(super) fn file_error(path: &Path, error: &io::Error) -> Error {
-    Error::File { file: path.display().to_string(), why: error.to_string() }
+    Error::io(&path.display().to_string(), error)
 }
 
 /// A file that several readers share, each with its own place in it. The lock is held while bytes are fetched, not

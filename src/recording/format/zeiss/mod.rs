@@ -13,17 +13,36 @@
 //! The app appends metadata from several threads without a lock, so their order means nothing, and a crash leaves
 //! them cut.
 
+mod json;
+mod metadata;
+mod pairing;
+mod rewrite;
+mod write;
+
+pub use write::{Writer, encode_depth};
+
 use std::{
     collections::{BTreeMap, BTreeSet},
     mem,
     sync::Arc,
 };
 
-use super::{
-    Error, Factory, Limits, Problem, Recording, Source, board_file, json,
-    metadata::{At, CameraRecord, DepthRecord},
-    pairing,
-    source::join,
+use json::End;
+use metadata::{At, CameraRecord, DepthRecord};
+
+use super::{Contents, Format};
+use crate::{
+    files::Output,
+    image::{DepthMap, Gray, Rgb},
+    recording::{Error, Factory, Images, MetadataEdit, Opened, Problem, board_file},
+};
+
+pub(super) const FORMAT: Format = Format {
+    name: "zeiss",
+    title: "the recording format of the ZEISS capture app",
+    has_depth: true,
+    recognises: |path| is_telltale(path.rsplit('/').next().unwrap_or(path)),
+    open,
 };
 
 pub(super) const DEPTH_METADATA: &str = "DepthMetadata.json";
@@ -42,51 +61,69 @@ pub(super) fn is_telltale(name: &str) -> bool {
     name == DEPTH_METADATA || pairing::parse_name(name).is_some()
 }
 
-/// Whether this format has a file of this name.
-#[cfg(feature = "fs")]
-pub(super) fn is_ours(name: &str) -> bool {
-    is_telltale(name) || [CAMERA_METADATA, BOARD, CHECKER_SIZE].contains(&name)
+/// Decodes images when they are asked for.
+struct ZeissImages(Contents);
+
+impl Images for ZeissImages {
+    fn color(&self, _: usize, file: &str) -> Result<Rgb, Error> {
+        self.0.decode(file, Rgb::from_png)
+    }
+
+    fn gray(&self, _: usize, file: &str) -> Result<Gray, Error> {
+        self.0.decode(file, Gray::from_png)
+    }
+
+    fn depth(&self, _: usize, file: &str) -> Result<DepthMap, Error> {
+        self.0.decode(file, |bytes, limits| DepthMap::from_png(bytes, DEPTH_UNIT_M, limits))
+    }
+
+    fn metadata_files(&self) -> [&str; 2] {
+        [CAMERA_METADATA, DEPTH_METADATA]
+    }
+
+    fn is_image(&self, file: &str) -> bool {
+        pairing::parse_name(file).is_some()
+    }
+
+    fn stores_as_ours(&self) -> bool {
+        true
+    }
+
+    fn rewrite_metadata(
+        &self,
+        edit: &dyn Fn(&str) -> MetadataEdit,
+        output: &mut dyn Output,
+    ) -> Result<(), Error> {
+        rewrite::metadata(&self.0, edit, output)
+    }
 }
 
-/// The recording in `folder` of the source; empty: at its top.
-pub(super) fn open(
-    source: Arc<dyn Source>,
-    folder: &str,
-    name: String,
-    limits: &Limits,
-) -> Result<Recording, Error> {
-    let place = join(source.place(), folder);
-    let place = place.trim_end_matches('/').to_owned();
-    let prefix = if folder.is_empty() { String::new() } else { format!("{folder}/") };
-    let names: Vec<&str> = source
-        .names()
-        .iter()
-        .filter_map(|name| name.strip_prefix(prefix.as_str()).filter(|rest| !rest.contains('/')))
-        .collect();
+/// Reads the recording among these files.
+fn open(contents: &Contents) -> Result<Opened, Error> {
+    let names = contents.names_here();
     let mut problems = Vec::new();
     let images = pairing::images(names.iter().copied(), &mut problems);
     if images.is_empty() {
-        return Err(Error::NoImages { path: place });
+        return Err(Error::NoImages { path: contents.place().to_owned() });
     }
     let read = |file: &str| -> Result<Option<Vec<u8>>, Error> {
         if !names.contains(&file) {
             return Ok(None);
         }
-        source.read(&format!("{prefix}{file}"), limits.file_bytes).map(Some)
+        contents.read(file).map(Some)
     };
-
-    let open = |file: &str| source.open(&format!("{prefix}{file}"), limits.file_bytes);
-    let whole = |file: &str| source.read(&format!("{prefix}{file}"), limits.file_bytes);
-    let (depth_file, camera_file) = (join(&place, DEPTH_METADATA), join(&place, CAMERA_METADATA));
+    let (depth_file, camera_file) = (contents.path(DEPTH_METADATA), contents.path(CAMERA_METADATA));
 
     // Every record is checked, also those without an image. Records of metadata are longer than all else that is kept
     // of a frame: none is kept, and frames of which they say the same share what they say.
     let mut odd = Vec::new();
+    let mut cut = Vec::new();
     let mut depth_records = Vec::new();
     if names.contains(&DEPTH_METADATA) {
         let mut last = None;
-        let whole = || whole(DEPTH_METADATA);
-        json::each_record(&depth_file, open(DEPTH_METADATA)?, whole, &mut |r: DepthRecord| {
+        let reader = contents.open(DEPTH_METADATA)?;
+        let whole = || contents.read(DEPTH_METADATA);
+        let end = json::each_record(&depth_file, reader, whole, &mut |r: DepthRecord| {
             let record = depth_records.len() + 1;
             let at = At { file: &depth_file, record, timestamp: r.timestamp };
             depth_records.push((r.timestamp, shared(&mut last, r.factory(at, &mut odd)?)));
@@ -94,22 +131,25 @@ pub(super) fn open(
             odd.dedup_by_key(|problem| mem::discriminant(problem));
             Ok(())
         })?;
+        cut.extend((end == End::Open).then_some(DEPTH_METADATA));
     } else {
         problems.push(Problem::MetadataMissing { file: DEPTH_METADATA });
     }
     let mut camera_records = Vec::new();
     if names.contains(&CAMERA_METADATA) {
-        let whole = || whole(CAMERA_METADATA);
-        json::each_record(&camera_file, open(CAMERA_METADATA)?, whole, &mut |r: CameraRecord| {
+        let reader = contents.open(CAMERA_METADATA)?;
+        let whole = || contents.read(CAMERA_METADATA);
+        let end = json::each_record(&camera_file, reader, whole, &mut |r: CameraRecord| {
             camera_records.push(r);
             Ok(())
         })?;
+        cut.extend((end == End::Open).then_some(CAMERA_METADATA));
     } else {
         problems.push(Problem::MetadataMissing { file: CAMERA_METADATA });
     }
     let board = match read(BOARD)? {
         Some(bytes) => {
-            let file = join(&place, BOARD);
+            let file = contents.path(BOARD);
             let beside = |name: &str| {
                 read(name)?.ok_or_else(|| Error::Board {
                     file: file.clone(),
@@ -120,7 +160,7 @@ pub(super) fn open(
         }
         None => match read(CHECKER_SIZE)? {
             Some(bytes) => {
-                Some(board_file::from_checker_size(&join(&place, CHECKER_SIZE), &bytes)?)
+                Some(board_file::from_checker_size(&contents.path(CHECKER_SIZE), &bytes)?)
             }
             None => None,
         },
@@ -160,29 +200,34 @@ pub(super) fn open(
             *slot = shared(&mut last, complete);
         }
     }
+    problems.extend(cut.into_iter().map(|file| Problem::MetadataUnfinished { file }));
     problems.extend(odd);
     problems.extend(variation(factories.values().map(Arc::as_ref)));
 
     let fallback = factories.values().next().cloned();
-    let frames = pairing::frames(
-        images,
-        |t| factories.remove(&t),
-        |t| {
-            let (_, camera) = camera_records.get(&t)?;
-            Some([camera.width as usize, camera.height as usize])
-        },
-    );
-    Ok(Recording {
-        name,
-        board,
-        frames,
-        problems,
-        fallback,
-        place,
-        prefix,
-        source,
-        limits: limits.clone(),
-    })
+    let mut scaled = None;
+    let frames = pairing::frames(images, |timestamp, mut frame| {
+        let factory = factories.remove(&timestamp);
+        if let Some(depth) = &mut frame.depth {
+            depth.size = factory.as_deref().map(Factory::size);
+            depth.factory = factory.clone();
+        }
+        if let Some(color) = &mut frame.color {
+            let camera = camera_records.get(&timestamp).map(|(_, camera)| camera);
+            color.size = camera.map(|camera| [camera.width as usize, camera.height as usize]);
+            let size = color.size.or(factory.as_deref().map(Factory::size));
+            color.factory = match (factory, size) {
+                (Some(factory), Some(size)) if factory.size() == size => Some(factory),
+                (Some(factory), Some(size)) => {
+                    factory.at_size(size).map(|factory| shared(&mut scaled, factory))
+                }
+                _ => None,
+            };
+        }
+        frame
+    });
+    let images = Arc::new(ZeissImages(contents.clone()));
+    Ok(Opened { board, frames, problems, fallback, images })
 }
 
 /// The last one again where it says the same.

@@ -11,7 +11,7 @@ use serde::{
     de::{DeserializeOwned, DeserializeSeed, SeqAccess, Visitor},
 };
 
-use super::Error;
+use crate::{files, recording::Error};
 
 /// All records of a file that is one JSON array.
 pub(super) fn records<T: DeserializeOwned>(file: &str, bytes: &[u8]) -> Result<Vec<T>, Error> {
@@ -23,6 +23,15 @@ pub(super) fn records<T: DeserializeOwned>(file: &str, bytes: &[u8]) -> Result<V
     Ok(records)
 }
 
+/// How an array of records ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum End {
+    /// With its `]`.
+    Closed,
+    /// After a whole record, without the `]`: whoever wrote it was stopped between two records.
+    Open,
+}
+
 /// Hands the records of a file that is one JSON array to `each`, one after the other, so that never more than one lies
 /// in memory. Where the file is no such array, `whole` is asked for its bytes to tell the place.
 pub(super) fn each_record<T: DeserializeOwned>(
@@ -30,23 +39,35 @@ pub(super) fn each_record<T: DeserializeOwned>(
     reader: impl Read,
     whole: impl FnOnce() -> Result<Vec<u8>, Error>,
     each: &mut Each<'_, T>,
-) -> Result<(), Error> {
-    let mut stopped = None;
+) -> Result<End, Error> {
+    let (mut n, mut stopped) = (0, None);
     let mut deserializer = serde_json::Deserializer::from_reader(BufReader::new(reader));
-    let records = Records { each, n: &mut 0, stopped: &mut stopped };
+    let records = Records { each, n: &mut n, stopped: &mut stopped };
     let result = records.deserialize(&mut deserializer).and_then(|()| deserializer.end());
     match (result, stopped) {
-        (Ok(()), _) => Ok(()),
+        (Ok(()), _) => Ok(End::Closed),
         (Err(_), Some(why)) => Err(why),
         (Err(error), None) => {
-            let unreadable = |why| Error::File { file: file.to_owned(), why };
+            let unreadable = |why| files::Error::File { file: file.to_owned(), why }.into();
             if error.is_io() {
                 return Err(unreadable(error.to_string()));
             }
-            parse_records::<T>(file, &whole()?, &mut |_| Ok(()))?;
+            let whole = whole()?;
+            let ends_whole = whole.trim_ascii_end().ends_with(b"}");
+            if error.is_eof() && ends_whole && n > 0 && is_array(&whole) {
+                return Ok(End::Open);
+            }
+            parse_records::<T>(file, &whole, &mut |_| Ok(()))?;
             Err(unreadable("changed while it was read".into()))
         }
     }
+}
+
+/// Whether records, with an end of our own, are an array: the last record is whole.
+fn is_array(records: &[u8]) -> bool {
+    let end = b"]".as_slice();
+    let mut closed = serde_json::Deserializer::from_reader(records.chain(end));
+    serde::de::IgnoredAny::deserialize(&mut closed).and_then(|_| closed.end()).is_ok()
 }
 
 /// What is done with each record; its error ends the reading.
@@ -228,7 +249,6 @@ mod tests {
                 &["f ends in the middle of record 2 (byte 62)", "keep its 1 whole"],
             ),
             (",", &["in the middle of record 2"]),
-            ("", &["in the middle of record 2"]),
             ("] x", &["record 2, line 2", "trailing characters"]),
             ("} ]", &["record 2", "expected `,` or `]`"]),
             (deep.as_str(), &["record 2"]),

@@ -5,10 +5,11 @@
 
 use serde::Deserialize;
 
-use super::{Error, Factory, Problem, json::Tuple};
+use super::json::Tuple;
 use crate::{
     camera::{Intrinsics, RadialTable, TablePair},
     geom::Pixel,
+    recording::{Error, Factory, Problem},
 };
 
 /// A record of `DepthMetadata.json`; keys that are not listed here are of no use to us.
@@ -80,17 +81,24 @@ impl At<'_> {
         value: impl ToString,
         expected: impl Into<String>,
     ) -> Result<(), Error> {
-        if valid {
-            return Ok(());
-        }
-        Err(Error::Value {
+        if valid { Ok(()) } else { Err(self.invalid(key, value, expected)) }
+    }
+
+    /// An error about the value of a key.
+    fn invalid(
+        self,
+        key: &'static str,
+        value: impl ToString,
+        expected: impl Into<String>,
+    ) -> Error {
+        Error::Value {
             file: self.file.to_owned(),
             record: self.record,
             timestamp: self.timestamp,
             key,
             value: value.to_string(),
             valid: expected.into(),
-        })
+        }
     }
 }
 
@@ -216,7 +224,7 @@ impl DepthRecord {
                 return Ok((Some(center), None));
             }
         };
-        // Tables of nothing but zeros are what a rectified recording says (ours do, `Amendment`): no table.
+        // Tables of nothing but zeros are what a rectified recording says (ours do, `MetadataEdit`): no table.
         if forward.iter().chain(inverse).all(|&m| m == 0.0) {
             return Ok((Some(center), None));
         }
@@ -232,14 +240,9 @@ impl DepthRecord {
                     "between -1 and 1 everywhere: a magnification minus one",
                 )?;
             }
-            RadialTable::new(center, radius, samples.to_vec()).or_else(|error| {
-                at.require(
-                    false,
-                    key,
-                    format!("{} numbers: {error}", samples.len()),
-                    "a table of the lens",
-                )?;
-                unreachable!("`require` has just failed")
+            RadialTable::new(center, radius, samples.to_vec()).map_err(|error| {
+                let value = format!("{} numbers: {error}", samples.len());
+                at.invalid(key, value, "a table of the lens")
             })
         };
         let forward = table("LensDistortionLookupTable", forward)?;

@@ -1,4 +1,4 @@
-//! Recordings in zip archives.
+//! Zip archives that are read.
 
 use std::{
     collections::BTreeMap,
@@ -11,10 +11,7 @@ use std::{
 
 use zip::{CompressionMethod, ZipArchive, result::ZipError};
 
-use super::{
-    Error, Limits, Source,
-    source::{join, too_long},
-};
+use super::{Error, Files, Limits, join, too_long};
 
 /// A zip archive. Nothing is ever unpacked to disk.
 ///
@@ -139,7 +136,7 @@ impl Archive {
     }
 }
 
-impl Source for Archive {
+impl Files for Archive {
     fn place(&self) -> &str {
         &self.place
     }

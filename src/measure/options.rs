@@ -1,12 +1,9 @@
-//! What the shells choose, and what they are told on the way.
+//! What front ends choose, and what they are told on the way.
 
-use crate::{
-    board::CharucoBoard,
-    calibrate::{KnownCamera, MAX_VIEWS},
-    diagnose::Tolerances,
-};
+use super::FrameMeasurement;
+use crate::{calibrate::KnownCamera, image::Rgb};
 
-/// Where the own intrinsics come from.
+/// Where the measured intrinsics come from.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Method {
     /// As the paper: one focal length, everything else as the factory says, views on a 4 cm grid, at least 9 corners.
@@ -25,26 +22,6 @@ impl Method {
             Self::Auto => "auto",
             Self::Given(_) => "given",
         }
-    }
-}
-
-/// Choices of an audit.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// Where the own intrinsics come from.
-    pub method: Method,
-    /// The board, where the recording does not tell or tells wrong; goes before the recording's own.
-    pub board: Option<CharucoBoard>,
-    /// What still counts as true.
-    pub tolerances: Tolerances,
-    /// Calibrate from so many views at most, as [`calibrate_from`](crate::calibrate::calibrate_from).
-    pub max_views: usize,
-}
-
-impl Options {
-    /// This method, the recording's board, default tolerances, views as many as calibrations take.
-    pub fn new(method: Method) -> Self {
-        Self { method, board: None, tolerances: Tolerances::default(), max_views: MAX_VIEWS }
     }
 }
 
@@ -80,3 +57,34 @@ pub struct Progress {
     /// Steps in all.
     pub total: usize,
 }
+
+/// Is told how far the job has come, and may look at images on the way. Called from any thread.
+pub trait Observer: Sync {
+    /// A step is done.
+    fn progress(&self, progress: Progress) {
+        let _ = progress;
+    }
+
+    /// A frame is going to be looked at. Whether its colour image is wanted in colour, for [`looked`](Self::looked).
+    fn begins(&self, frame: usize) -> bool {
+        let _ = frame;
+        false
+    }
+
+    /// The colour image of a frame is decoded.
+    fn decoded(&self, frame: usize) {
+        let _ = frame;
+    }
+
+    /// The board was looked for in the colour image of a frame; with the image where it was wanted, so that it need not
+    /// be decoded again.
+    fn looked(&self, frame: usize, found: &FrameMeasurement, image: Option<&Rgb>) {
+        let _ = (frame, found, image);
+    }
+}
+
+/// Wants to be told nothing.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Silent;
+
+impl Observer for Silent {}

@@ -1,11 +1,8 @@
 //! Frames from the names of images and the timestamps of metadata: paired by time, never by position.
 
-use std::{
-    collections::{BTreeMap, BTreeSet, btree_map::Entry},
-    sync::Arc,
-};
+use std::collections::{BTreeMap, BTreeSet, btree_map::Entry};
 
-use super::{Factory, Frame, Problem};
+use crate::recording::{Frame, FrameImage, Problem};
 
 /// An image of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -107,22 +104,22 @@ pub(super) fn by_time<T>(
     by_time
 }
 
-/// Frames in order of time. `factory` and `color_size` tell what the metadata say at a time.
+/// Frames in order of time; `complete` adds what the metadata say at a time.
 pub(super) fn frames(
     images: BTreeMap<i64, Images>,
-    mut factory: impl FnMut(i64) -> Option<Arc<Factory>>,
-    color_size: impl Fn(i64) -> Option<[usize; 2]>,
+    mut complete: impl FnMut(i64, Frame) -> Frame,
 ) -> Vec<Frame> {
     let first = images.keys().next().copied().unwrap_or(0);
     images
         .into_iter()
-        .map(|(timestamp, Images { color, depth })| Frame {
-            t_ns: (timestamp - first) * 1_000_000,
-            timestamp,
-            color,
-            depth,
-            factory: factory(timestamp),
-            color_size: color_size(timestamp),
+        .map(|(timestamp, Images { color, depth })| {
+            let frame = Frame {
+                id: timestamp.to_string(),
+                t_ns: (timestamp - first) * 1_000_000,
+                color: color.map(FrameImage::named),
+                depth: depth.map(FrameImage::named),
+            };
+            complete(timestamp, frame)
         })
         .collect()
 }
@@ -172,7 +169,7 @@ mod tests {
                 Problem::DepthWithoutColor { timestamps: vec![4] },
             ]
         );
-        let frames = frames(images, |_| None, |_| None);
+        let frames = frames(images, |_, frame| frame);
         assert_eq!(frames.iter().map(|f| f.t_ns).collect::<Vec<_>>(), [0, 1_000_000, 17_000_000]);
     }
 
