@@ -4,12 +4,14 @@ use std::sync::Arc;
 
 use truedepth::{
     audit::{Audit, Options, audit},
-    camera::{Camera, Distortion},
+    board::CharucoBoard,
+    camera::{Camera, Distortion, Intrinsics},
     correct::{Plan, Sampling, Selection, correct},
     diagnose::{Code, Verdict},
     files::{Limits, Memory},
+    image::{DepthMap, Rgb},
     measure::{Method, Silent},
-    recording::{Defect, Recording},
+    recording::{Defect, Factory, Frame, FrameImage, Recording},
     simulate::{Device, Faults, Plan as Simulation},
 };
 
@@ -201,4 +203,48 @@ fn mirroring_twice_is_nothing_and_a_wrong_camera_is_refused() {
     let mut sink = Memory::new("never");
     let error = correct(&recording, &plan, &mut sink).unwrap_err();
     assert!(error.to_string().contains("320x480") && sink.files().is_empty(), "{error}");
+}
+
+/// Whatever was read, our own layout is written: here images in memory, colour three times as large as depth.
+#[test]
+fn a_recording_in_memory_is_corrected() {
+    let k = Intrinsics { fx: 9.0, fy: 9.0, cx: 3.5, cy: 2.5, width: 8, height: 6 };
+    let factory = Arc::new(Factory::pinhole(k));
+    let large = Arc::new(factory.at_size([24, 18]).expect("the same shape"));
+    let image = |file: &str, factory: &Arc<Factory>| {
+        let (size, factory) = (Some(factory.size()), Some(Arc::clone(factory)));
+        Some(FrameImage { file: file.into(), size, factory })
+    };
+    let frames = (0..3)
+        .map(|i| {
+            let frame = Frame {
+                id: format!("number {i}"),
+                t_ns: i * 33_333_333,
+                color: image("c", &large),
+                depth: image("d", &factory),
+            };
+            let color = Rgb::new(24, 18, vec![[i as u8; 3]; 24 * 18]);
+            (frame, Some(color), Some(DepthMap::new(8, 6, vec![0.505; 48])))
+        })
+        .collect();
+    let board = CharucoBoard::paper(0.020875).expect("a board");
+    let recording = Recording::in_memory("phone", Some(board.clone()), frames);
+    let defects = [Defect::DepthScale { ratio: 1.01 }, Defect::Focal { ratio: 1.125 }];
+    let plan = Plan::given(&defects).expect("can be");
+    let mut files = Memory::new("corrected");
+    let done = correct(&recording, &plan, &mut files).expect("corrects");
+    assert_eq!((done.n_frames, done.files.len()), (3, 0));
+    let corrected = Recording::from_files(Arc::new(files), &Limits::default()).expect("opens");
+    assert_eq!(corrected.problems, []);
+    assert!(corrected.board == Some(board));
+    let times: Vec<i64> = corrected.frames.iter().map(|frame| frame.t_ns).collect();
+    assert_eq!(times, [0, 33_000_000, 66_000_000]);
+    for (i, frame) in corrected.frames.iter().enumerate() {
+        assert_eq!(corrected.color(i).expect("decodes"), recording.color(i).expect("is there"));
+        assert!((corrected.depth(i).expect("decodes").at(3, 3) - 0.5).abs() < 1e-6);
+        let of = |image: &Option<FrameImage>| image.as_ref()?.factory.clone();
+        let (color, depth) = (of(&frame.color).expect("known"), of(&frame.depth).expect("known"));
+        assert_eq!((depth.intrinsics.fx, color.intrinsics.fx), (8.0, 24.0));
+        assert_eq!(color.size(), [24, 18]);
+    }
 }
