@@ -12,8 +12,8 @@ use crate::{
     geom::{Board, Color, Pose},
     math,
     solve::{
-        Arrow, ArrowNormal, BySchur, DenseCholesky, Effort, Loss, Pooled, Reduced, covariance_of,
-        larger, minimize, total, units,
+        Arrow, ArrowNormal, BySchur, DenseCholesky, Effort, Loss, Pooled, Reduced, Row,
+        covariance_of, larger, minimize, total, units,
     },
 };
 
@@ -128,40 +128,23 @@ fn motion_counts(share: f64) -> f64 {
 /// The least-squares fit of `shape` from `start`. `None` where the start does not project, or there are fewer residuals
 /// than parameters.
 pub(super) fn fit(shape: Shape<'_>, data: &Data<'_>, start: Start<'_>) -> Option<Fit> {
-    match start.free.len() {
-        1 => fit_sized::<1>(shape, data, start),
-        2 => fit_sized::<2>(shape, data, start),
-        3 => fit_sized::<3>(shape, data, start),
-        4 => fit_sized::<4>(shape, data, start),
-        5 => fit_sized::<5>(shape, data, start),
-        6 => fit_sized::<6>(shape, data, start),
-        7 => fit_sized::<7>(shape, data, start),
-        8 => fit_sized::<8>(shape, data, start),
-        9 => fit_sized::<9>(shape, data, start),
-        10 => fit_sized::<10>(shape, data, start),
-        11 => fit_sized::<11>(shape, data, start),
-        n => unreachable!("no shape has {n} free numbers"),
-    }
-}
-
-fn fit_sized<const S: usize>(shape: Shape<'_>, data: &Data<'_>, start: Start<'_>) -> Option<Fit> {
+    let n_shared = start.free.len();
     let degrees =
-        (2 * data.n_corners()).checked_sub(S + 6 * data.views.len()).filter(|&d| d > 0)?;
-    let problem = Reprojection::<S> {
+        (2 * data.n_corners()).checked_sub(n_shared + 6 * data.views.len()).filter(|&d| d > 0)?;
+    let problem = Reprojection {
         shape,
         factory: data.factory,
         views: data.views,
         loss: data.loss,
         sheet: data.sheet,
     };
-    let shared: [f64; S] = start.free.try_into().expect("dispatched on the length");
     let mut loose = start.knots_m.to_vec();
     loose.resize(data.sheet.n_knots(shape.surface), 0.0);
-    let start = Arrow { shared, loose, blocks: start.poses.to_vec() };
+    let start = Arrow { shared: start.free.to_vec(), loose, blocks: start.poses.to_vec() };
     let effort = Effort { cost_tolerance: data.cost_tolerance, ..Effort::default() };
     let minimum = minimize(&BySchur(&problem), start, effort)?;
     let Arrow { shared, loose, blocks: poses } = minimum.state;
-    let n = S + loose.len();
+    let n = n_shared + loose.len();
 
     // The robust sum of squares, but for the rare corner beyond the loss' threshold, is the weighted one. Each height
     // that was seen takes one degree of freedom at most: the prior holds them together.
@@ -169,7 +152,7 @@ fn fit_sized<const S: usize>(shape: Shape<'_>, data: &Data<'_>, start: Start<'_>
     let variance = 2.0 * minimum.cost / degrees as f64;
     let mut pictures = vec![Reduced::zero(n); data.n_pictures()];
     let mut held_out = vec![0.0; data.n_pictures()];
-    let mut diagonal = [0.0; S];
+    let mut diagonal = vec![0.0; n_shared];
     let mut reducible = true;
     for (block, &picture) in minimum.normal.blocks.iter().zip(data.pictures) {
         reducible &= block.reduce_into(&mut pictures[picture]);
@@ -185,7 +168,7 @@ fn fit_sized<const S: usize>(shape: Shape<'_>, data: &Data<'_>, start: Start<'_>
     // Heights from a plane that no picture tells from the poses are as unsure as beforehand, all of them alike, and
     // what makes the residuals of a picture alike is lost in that: heights from the board's own plane are asked for.
     let sums = match data.wanted {
-        Wanted::Camera | Wanted::CameraInMotion => units(S, n),
+        Wanted::Camera | Wanted::CameraInMotion => units(n_shared, n),
         Wanted::Everything => {
             let mut sums = units(n, n);
             data.sheet.take_planes_out(shape.surface, &mut sums);
@@ -231,7 +214,7 @@ fn fit_sized<const S: usize>(shape: Shape<'_>, data: &Data<'_>, start: Start<'_>
             mean_motion(&minimum.normal, &poses, &planes, &joint)
         });
     Some(Fit {
-        free: shared.to_vec(),
+        free: shared,
         knots_m: loose,
         poses,
         covariance,
@@ -246,12 +229,12 @@ fn fit_sized<const S: usize>(shape: Shape<'_>, data: &Data<'_>, start: Start<'_>
 ///
 /// Eliminating the poses subtracts nearly equal numbers where they can imitate a parameter; below 1e-9 of the whole
 /// the difference is rounding.
-fn is_determined<const S: usize>(pooled: &Pooled<'_>, diagonal: &[f64; S], n: usize) -> bool {
+fn is_determined(pooled: &Pooled<'_>, diagonal: &[f64], n: usize) -> bool {
     const LEAST_SHARE: f64 = 1e-9;
     let inverse = pooled.classical();
-    (0..S).all(|i| {
+    diagonal.iter().enumerate().all(|(i, alone)| {
         let variance = inverse[i * n + i];
-        variance > 0.0 && 1.0 / variance > LEAST_SHARE * diagonal[i]
+        variance > 0.0 && 1.0 / variance > LEAST_SHARE * alone
     })
 }
 
@@ -265,10 +248,10 @@ const MOTION_SHARES: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
 /// greatest likelihood (up to what is the same for all speeds,
 /// −2·ln likelihood = N·ln(sum of squares) + Σ (ln det V − ln det P), V the normal equations of a view's own numbers, P
 /// the prior's share of it).
-fn shutter<const S: usize>(
-    problem: &Reprojection<'_, S>,
-    normal: &ArrowNormal<S, 6>,
-    (shared, knots_m): (&[f64; S], &[f64]),
+fn shutter(
+    problem: &Reprojection<'_>,
+    normal: &ArrowNormal<6>,
+    (shared, knots_m): (&[f64], &[f64]),
     poses: &[Pose<Color, Board>],
 ) -> Option<Shutter> {
     let n_residuals: usize = problem.views.iter().map(|view| 2 * view.corners.len()).sum();
@@ -284,9 +267,10 @@ fn shutter<const S: usize>(
             // Velocities are near zero, to these σ.
             let mut block = view.clone();
             for (k, sigma) in sigma.into_iter().enumerate() {
-                let mut unit = [0.0; 12];
-                unit[6 + k] = 1.0;
-                block.add_row(sigma.powi(-2), 0.0, &[0.0; S], &unit);
+                let mut d_block = [0.0; 12];
+                d_block[6 + k] = 1.0;
+                let weight = sigma.powi(-2);
+                block.add_block_rows(&[Row { weight, residual: 0.0, d_block }]);
             }
             let (by_own, log_determinant) = block.block_gain()?;
             gain += by_own;
@@ -315,8 +299,8 @@ fn shutter<const S: usize>(
     all?.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, shutter)| shutter)
 }
 
-fn mean_motion<const S: usize>(
-    normal: &ArrowNormal<S, 6>,
+fn mean_motion(
+    normal: &ArrowNormal<6>,
     poses: &[Pose<Color, Board>],
     planes: &[[f64; 6]],
     joint: &Joint<'_>,

@@ -31,7 +31,7 @@ pub(super) struct Measured {
     pub(super) pose: Pose<Color, Board>,
 }
 
-pub(super) struct Reprojection<'a, const S: usize> {
+pub(super) struct Reprojection<'a> {
     pub(super) shape: Shape<'a>,
     pub(super) factory: &'a Intrinsics,
     pub(super) views: &'a [&'a Measured],
@@ -66,8 +66,8 @@ enum ReadyLens<'a> {
     },
 }
 
-impl<'a, const S: usize> Reprojection<'a, S> {
-    fn ready(&self, shared: &[f64; S]) -> Ready<'a> {
+impl<'a> Reprojection<'a> {
+    fn ready(&self, shared: &[f64]) -> Ready<'a> {
         let numbers = self.shape.warp_numbers(shared);
         let lens = match self.shape.warp {
             Warp::None => ReadyLens::None,
@@ -233,15 +233,15 @@ struct ViewSums {
 /// How many numbers a pose has.
 const POSE: usize = 6;
 
-impl<const S: usize> Reprojection<'_, S> {
+impl Reprojection<'_> {
     /// Adds all residuals of a view. Its own parameters are its pose, and where there are twice as many by how much
     /// this changes from the first row to the last.
     fn add_view<const B: usize>(
         &self,
         index: usize,
-        (shared, knots_m): (&[f64; S], &[f64]),
+        (shared, knots_m): (&[f64], &[f64]),
         pose: &Pose<Color, Board>,
-        normal: &mut BlockNormal<S, B>,
+        normal: &mut BlockNormal<B>,
     ) -> bool {
         if !(shared[0] > 0.0) {
             return false;
@@ -256,7 +256,7 @@ impl<const S: usize> Reprojection<'_, S> {
             loss: self.loss,
             per_row: (self.factory.height as f64).recip(),
             n_own: B,
-            n_shared: S,
+            n_shared: shared.len(),
         };
         let Some(sums) = view.sums(pose) else { return false };
         sums.totals.add_to(normal);
@@ -265,11 +265,10 @@ impl<const S: usize> Reprojection<'_, S> {
         if !knots_m.is_empty() {
             normal.reserve_loose(corners.len());
         }
-        for (corner, numbers) in corners.iter().zip(sums.by_height.chunks(B + S + 2)) {
+        for (corner, numbers) in corners.iter().zip(sums.by_height.chunks(B + shared.len() + 2)) {
             let by_block = std::array::from_fn(|i| numbers[i]);
-            let by_shared = std::array::from_fn(|i| numbers[B + i]);
-            let own = (numbers[B + S], numbers[B + S + 1]);
-            normal.push_loose(corner.id, (by_shared, by_block), own);
+            let (by_shared, own) = numbers[B..].split_at(shared.len());
+            normal.push_loose(corner.id, (by_shared, by_block), (own[0], own[1]));
         }
         if let Some(mixture) = self.sheet.mixture(self.shape.surface) {
             normal.mix_loose(mixture);
@@ -282,10 +281,10 @@ impl<const S: usize> Reprojection<'_, S> {
     pub(super) fn moving_view(
         &self,
         index: usize,
-        numbers: (&[f64; S], &[f64]),
+        numbers: (&[f64], &[f64]),
         pose: &Pose<Color, Board>,
-    ) -> Option<BlockNormal<S, 12>> {
-        let mut normal = BlockNormal::ZERO;
+    ) -> Option<BlockNormal<12>> {
+        let mut normal = BlockNormal::zero(numbers.0.len());
         self.add_view(index, numbers, pose, &mut normal).then_some(normal)
     }
 }
@@ -398,24 +397,25 @@ impl ReadyView<'_> {
     }
 }
 
-impl<const S: usize> Bordered<S, 6> for Reprojection<'_, S> {
+impl Bordered<6> for Reprojection<'_> {
     type Block = Pose<Color, Board>;
 
     fn linearize_block(
         &self,
         index: usize,
-        shared: &[f64; S],
+        shared: &[f64],
         knots_m: &[f64],
         pose: &Self::Block,
-        normal: &mut BlockNormal<S, 6>,
+        normal: &mut BlockNormal<6>,
     ) -> bool {
         self.add_view(index, (shared, knots_m), pose, normal)
     }
 
-    fn shared_precision(&self) -> [f64; S] {
-        let first = S - self.shape.surface.n_shared();
-        let precision = self.sheet.shared_precision(self.shape.surface);
-        std::array::from_fn(|i| if i < first { 0.0 } else { precision })
+    fn shared_precision(&self) -> Vec<f64> {
+        let mut precision = vec![0.0; self.shape.names().len()];
+        let of_surface = self.sheet.shared_precision(self.shape.surface);
+        precision.extend(vec![of_surface; self.shape.surface.n_shared()]);
+        precision
     }
 
     fn loose_precision(&self) -> &[f64] {

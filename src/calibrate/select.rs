@@ -8,7 +8,6 @@ use super::{
     views,
 };
 use crate::{
-    math,
     pose::Weighting,
     solve::{BlockNormal, Bordered, Cholesky, Loss, Reduced},
 };
@@ -52,16 +51,11 @@ pub(super) fn most_telling(
     let references: Vec<&Measured> = weighed.iter().collect();
     let sheet = Sheet::flat(input.board);
     let factory = input.factory;
-    let problem = Reprojection::<N> {
-        shape,
-        factory,
-        views: &references,
-        loss: Loss::Squared,
-        sheet: &sheet,
-    };
+    let problem =
+        Reprojection { shape, factory, views: &references, loss: Loss::Squared, sheet: &sheet };
     let shared = [factory.fx, factory.cx, factory.cy, 0.0, 0.0];
     let of_view = |index: usize| {
-        let mut normal = BlockNormal::ZERO;
+        let mut normal = BlockNormal::zero(N);
         let pose = &weighed[index].pose;
         let mut reduced = Reduced::zero(N);
         let seen = problem.linearize_block(index, &shared, &[], pose, &mut normal)
@@ -122,22 +116,7 @@ fn sum(mut a: Information, b: &Information) -> Information {
 
 /// ln det of a positive definite matrix; −∞ of any other.
 fn log_determinant(matrix: &Information) -> f64 {
-    let mut l = *matrix;
-    let mut log = 0.0;
-    for j in 0..N {
-        let pivot = l[j][j];
-        if !(pivot > 0.0) {
-            return f64::NEG_INFINITY;
-        }
-        log += math::ln(pivot);
-        for i in j + 1..N {
-            let share = l[i][j] / pivot;
-            for k in j + 1..=i {
-                l[i][k] -= share * l[k][j];
-            }
-        }
-    }
-    log
+    Cholesky::new(matrix).map_or(f64::NEG_INFINITY, |factor| factor.log_determinant())
 }
 
 #[cfg(test)]

@@ -22,16 +22,16 @@ struct Reprojection<'a> {
     sightings: &'a [Sighting],
 }
 
-impl Bordered<0, 6> for Reprojection<'_> {
+impl Bordered<6> for Reprojection<'_> {
     type Block = Pose<Color, Board>;
 
     fn linearize_block(
         &self,
         _index: usize,
-        _shared: &[f64; 0],
+        _shared: &[f64],
         _loose: &[f64],
         pose: &Self::Block,
-        normal: &mut BlockNormal<0, 6>,
+        normal: &mut BlockNormal<6>,
     ) -> bool {
         vectorized(
             #[inline(always)]
@@ -49,11 +49,11 @@ impl Bordered<0, 6> for Reprojection<'_> {
                         let residual = sighting.pixel - pixel;
                         for ((r, d), row) in residual.into_iter().zip(by_point).zip(rows) {
                             let d_block = d_pixel_d_pose(d, &turned);
-                            *row = Row { weight, residual: r, d_shared: [], d_block };
+                            *row = Row { weight, residual: r, d_block };
                             normal.add_cost(0.5 * weight * r * r);
                         }
                     }
-                    normal.add_rows(&rows);
+                    normal.add_block_rows(&rows);
                 }
                 true
             },
@@ -99,7 +99,7 @@ pub(super) fn refine(
     cost_tolerance: f64,
 ) -> Option<(Pose<Color, Board>, f64)> {
     let problem = Reprojection { camera, sightings };
-    let start = Arrow { shared: [], loose: Vec::new(), blocks: vec![start] };
+    let start = Arrow { shared: Vec::new(), loose: Vec::new(), blocks: vec![start] };
     let effort = Effort { cost_tolerance, ..Effort::default() };
     let minimum = minimize(&BySchur(&problem), start, effort)?;
     Some((minimum.state.blocks[0], 2.0 * minimum.cost))

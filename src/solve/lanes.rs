@@ -5,13 +5,13 @@
 
 use fearless_simd::{Simd, f64x8, prelude::*};
 
-use super::BlockNormal;
+use super::{BlockNormal, MAX_SHARED};
 
 /// So many residuals lie side by side.
 pub(crate) const LANES: usize = 8;
 
 /// A residual depends on so many parameters at the most, those of its block and the shared ones together.
-pub(crate) const MAX_PARAMETERS: usize = 24;
+pub(crate) const MAX_PARAMETERS: usize = MAX_SHARED + 12;
 
 /// As [`Row`](super::Row), of eight residuals side by side. The derivatives are those by the block's parameters, then
 /// those by the shared ones; what lies behind them does not count.
@@ -70,15 +70,17 @@ pub(crate) struct Totals {
 }
 
 impl Totals {
-    /// Panics where they are not of `S` and `B` parameters.
-    pub(crate) fn add_to<const S: usize, const B: usize>(&self, normal: &mut BlockNormal<S, B>) {
-        assert_eq!(self.right.len(), S + B, "parameters");
+    /// Panics where they are of another number of parameters.
+    pub(crate) fn add_to<const B: usize>(&self, normal: &mut BlockNormal<B>) {
+        let n_shared = normal.n_shared();
+        assert_eq!(self.right.len(), B + n_shared, "parameters");
         let mut products = self.products.iter();
         for (i, row) in normal.v.iter_mut().enumerate() {
             row[..=i].iter_mut().zip(&mut products).for_each(|(sum, product)| *sum += product);
         }
-        for (i, (by_block, by_shared)) in normal.w.iter_mut().zip(&mut normal.u).enumerate() {
-            let row = by_block.iter_mut().chain(&mut by_shared[..=i]);
+        for (i, by_block) in normal.w.iter_mut().enumerate() {
+            let by_shared = &mut normal.u[i * n_shared..=i * n_shared + i];
+            let row = by_block.iter_mut().chain(by_shared);
             row.zip(&mut products).for_each(|(sum, product)| *sum += product);
         }
         let right = normal.h.iter_mut().chain(&mut normal.g);

@@ -12,24 +12,17 @@ pub struct Mixture {
     pub n_parameters: usize,
 }
 
-impl<const S: usize, const B: usize> BlockNormal<S, B> {
+impl<const B: usize> BlockNormal<B> {
     /// Takes the loose parameters so far for mixtures of others.
     pub fn mix_loose(&mut self, mixture: &Mixture) {
         let n = mixture.n_parameters;
-        let zero = |parameter| Loose {
-            parameter,
-            by_shared: [0.0; S],
-            by_itself: 0.0,
-            by_block: [0.0; B],
-            right: 0.0,
-        };
-        let mut mixed: Vec<Loose<S, B>> = (0..n).map(zero).collect();
+        let mut mixed: Vec<Loose<B>> = (0..n).map(Loose::zero).collect();
         let mut between = vec![0.0; n * n];
         for loose in &self.loose {
             let shares = &mixture.shares[loose.parameter];
             for (at, &(a, share)) in shares.iter().enumerate() {
                 let into = &mut mixed[a];
-                (0..S).for_each(|i| into.by_shared[i] += share * loose.by_shared[i]);
+                (0..self.n_shared()).for_each(|i| into.by_shared[i] += share * loose.by_shared[i]);
                 (0..B).for_each(|i| into.by_block[i] += share * loose.by_block[i]);
                 into.right += share * loose.right;
                 into.by_itself += share * share * loose.by_itself;

@@ -7,24 +7,24 @@
 //! Residuals are *observed − predicted*, derivatives are those of the prediction.
 //!
 //! ```
-//! use truedepth::solve::{Arrow, BlockNormal, Bordered, BySchur, Effort, minimize};
+//! use truedepth::solve::{Arrow, BlockNormal, Bordered, BySchur, Effort, Row, minimize};
 //!
 //! /// Lines of one common slope, each with its own offset.
 //! struct Lines([Vec<(f64, f64)>; 2]);
 //!
-//! impl Bordered<1, 1> for Lines {
+//! impl Bordered<1> for Lines {
 //!     type Block = f64;
 //!     fn linearize_block(
 //!         &self,
 //!         i: usize,
-//!         [slope]: &[f64; 1],
+//!         shared: &[f64],
 //!         _loose: &[f64],
 //!         offset: &f64,
-//!         n: &mut BlockNormal<1, 1>,
+//!         n: &mut BlockNormal<1>,
 //!     ) -> bool {
 //!         for &(x, y) in &self.0[i] {
-//!             let residual = y - (slope * x + offset);
-//!             n.add_row(1.0, residual, &[x], &[1.0]);
+//!             let residual = y - (shared[0] * x + offset);
+//!             n.add_row(&Row { weight: 1.0, residual, d_block: [1.0] }, &[x]);
 //!             n.add_cost(0.5 * residual * residual);
 //!         }
 //!         true
@@ -35,7 +35,7 @@
 //! }
 //!
 //! let lines = Lines([vec![(0.0, 1.0), (1.0, 3.0)], vec![(0.0, 5.0), (2.0, 9.0)]]);
-//! let start = Arrow { shared: [0.0], loose: Vec::new(), blocks: vec![0.0; 2] };
+//! let start = Arrow { shared: vec![0.0], loose: Vec::new(), blocks: vec![0.0; 2] };
 //! let minimum = minimize(&BySchur(&lines), start, Effort::default()).expect("in the domain");
 //! assert!((minimum.state.shared[0] - 2.0).abs() < 1e-9);
 //! assert!((minimum.state.blocks[1] - 5.0).abs() < 1e-9);
@@ -65,5 +65,7 @@ pub(crate) use lanes::{LANES, MAX_PARAMETERS, Rows, Sums, Totals, sum};
 pub use lm::{Effort, LeastSquares, Minimum, Solution, minimize};
 pub use loss::Loss;
 pub use mixture::Mixture;
-pub use schur::{Arrow, ArrowNormal, BlockNormal, Bordered, BySchur, Reduced, Response, Row};
+pub use schur::{
+    Arrow, ArrowNormal, BlockNormal, Bordered, BySchur, MAX_SHARED, Reduced, Response, Row,
+};
 pub use stats::{mad_sigma, mean, median, quantile, rms, standard_deviation, standard_error};

@@ -8,7 +8,10 @@
 use super::{Cholesky, DenseCholesky, LeastSquares, Solution};
 use crate::par::vectorized;
 
-/// A least-squares problem of `S` shared parameters, any number of *loose* ones, and any number of blocks of `B`
+/// So many parameters can be shared.
+pub const MAX_SHARED: usize = 12;
+
+/// A least-squares problem of up to [`MAX_SHARED`] shared parameters, any number of *loose* ones, and any number of blocks of `B`
 /// parameters each: a residual depends on the shared parameters, on one block, and on one loose parameter at most (or
 /// on a [`Mixture`](super::Mixture) of several).
 /// Bundle adjustment of intrinsics (shared), heights of a board's corners (loose) and poses (blocks) is one.
@@ -21,7 +24,7 @@ use crate::par::vectorized;
 /// ⎢ W₁ᵀ  V₁       ⎥     (Σ Uᵢ − Wᵢ·Vᵢ⁻¹·Wᵢᵀ)·δ_u = Σ gᵢ − Wᵢ·Vᵢ⁻¹·hᵢ
 /// ⎣ W₂ᵀ      V₂ … ⎦     δᵢ = Vᵢ⁻¹·(hᵢ − Wᵢᵀ·δ_u)
 /// ```
-pub trait Bordered<const S: usize, const B: usize> {
+pub trait Bordered<const B: usize> {
     /// The state of one block; its tangent space has `B` dimensions.
     type Block: Clone;
 
@@ -29,15 +32,15 @@ pub trait Bordered<const S: usize, const B: usize> {
     fn linearize_block(
         &self,
         index: usize,
-        shared: &[f64; S],
+        shared: &[f64],
         loose: &[f64],
         block: &Self::Block,
-        normal: &mut BlockNormal<S, B>,
+        normal: &mut BlockNormal<B>,
     ) -> bool;
 
-    /// The precision (1/σ²) with which each shared parameter is known to be near zero beforehand; 0 for not at all.
-    fn shared_precision(&self) -> [f64; S] {
-        [0.0; S]
+    /// The precision (1/σ²) with which each shared parameter is known to be near zero beforehand; empty for not at all.
+    fn shared_precision(&self) -> Vec<f64> {
+        Vec::new()
     }
 
     /// The inverse covariance with which the loose parameters are known to be near zero beforehand: row-major, of all
@@ -52,19 +55,19 @@ pub trait Bordered<const S: usize, const B: usize> {
 
 /// What one block contributes to the normal equations. Of symmetric matrices the lower triangle counts.
 #[derive(Clone, Debug)]
-pub struct BlockNormal<const S: usize, const B: usize> {
-    /// U: shared by shared.
-    pub(super) u: [[f64; S]; S],
+pub struct BlockNormal<const B: usize> {
+    /// U: shared by shared, row-major.
+    pub(super) u: Vec<f64>,
     /// W: shared by block.
-    pub(super) w: [[f64; B]; S],
+    pub(super) w: Vec<[f64; B]>,
     /// V: block by block.
     pub(super) v: [[f64; B]; B],
     /// g: right-hand side of the shared parameters.
-    pub(super) g: [f64; S],
+    pub(super) g: Vec<f64>,
     /// h: right-hand side of the block's parameters.
     pub(super) h: [f64; B],
     /// The rows of the loose parameters that this block has to do with.
-    pub(super) loose: Vec<Loose<S, B>>,
+    pub(super) loose: Vec<Loose<B>>,
     /// Loose by loose parameters beside the diagonal: row-major, of all of them; empty where there is nothing.
     pub(super) between: Vec<f64>,
     /// Half the (robust) sum of squares.
@@ -74,56 +77,83 @@ pub struct BlockNormal<const S: usize, const B: usize> {
 /// The rows of one loose parameter. Before they are mixed loose parameters never share a residual, so that U is
 /// diagonal among them.
 #[derive(Clone, Debug)]
-pub(super) struct Loose<const S: usize, const B: usize> {
+pub(super) struct Loose<const B: usize> {
     pub(super) parameter: usize,
-    pub(super) by_shared: [f64; S],
+    /// As many as there are shared parameters, then zeros.
+    pub(super) by_shared: [f64; MAX_SHARED],
     pub(super) by_itself: f64,
     pub(super) by_block: [f64; B],
     pub(super) right: f64,
 }
 
-/// A residual (observed − predicted), its weight in the sum of squares, and the derivatives of the *prediction*.
+impl<const B: usize> Loose<B> {
+    pub(super) const fn zero(parameter: usize) -> Self {
+        let by_shared = [0.0; MAX_SHARED];
+        Self { parameter, by_shared, by_itself: 0.0, by_block: [0.0; B], right: 0.0 }
+    }
+}
+
+/// A residual (observed − predicted) of a block of `B` parameters, its weight in the sum of squares, and the derivatives
+/// of the *prediction*.
 #[derive(Clone, Copy, Debug)]
-pub struct Row<const S: usize, const B: usize> {
+pub struct Row<const B: usize> {
     /// In the sum of squares.
     pub weight: f64,
     /// Observed − predicted.
     pub residual: f64,
-    /// By the shared parameters.
-    pub d_shared: [f64; S],
-    /// By those of the block.
+    /// By the block's parameters.
     pub d_block: [f64; B],
 }
 
-impl<const S: usize, const B: usize> Row<S, B> {
+impl<const B: usize> Row<B> {
     /// Says nothing.
-    pub const ZERO: Self =
-        Self { weight: 0.0, residual: 0.0, d_shared: [0.0; S], d_block: [0.0; B] };
+    pub const ZERO: Self = Self { weight: 0.0, residual: 0.0, d_block: [0.0; B] };
 }
 
-impl<const S: usize, const B: usize> BlockNormal<S, B> {
-    /// Nothing added yet.
-    pub const ZERO: Self = Self {
-        u: [[0.0; S]; S],
-        w: [[0.0; B]; S],
-        v: [[0.0; B]; B],
-        g: [0.0; S],
-        h: [0.0; B],
-        loose: Vec::new(),
-        between: Vec::new(),
-        cost: 0.0,
-    };
-
-    /// Adds a residual (observed − predicted) with the derivatives of the *prediction*, in a sum of squares with this
-    /// weight. The cost is added apart, by [`add_cost`](Self::add_cost).
-    #[inline]
-    pub fn add_row(&mut self, weight: f64, residual: f64, d_shared: &[f64; S], d_block: &[f64; B]) {
-        self.add_rows(&[Row { weight, residual, d_shared: *d_shared, d_block: *d_block }]);
+impl<const B: usize> BlockNormal<B> {
+    /// Nothing added yet, with so many shared parameters.
+    ///
+    /// Panics where these are more than [`MAX_SHARED`].
+    pub fn zero(n_shared: usize) -> Self {
+        assert!(n_shared <= MAX_SHARED, "{n_shared} shared parameters");
+        Self {
+            u: vec![0.0; n_shared * n_shared],
+            w: vec![[0.0; B]; n_shared],
+            v: [[0.0; B]; B],
+            g: vec![0.0; n_shared],
+            h: [0.0; B],
+            loose: Vec::new(),
+            between: Vec::new(),
+            cost: 0.0,
+        }
     }
 
-    /// Adds several residuals at once: the sums go through memory once for all of them.
+    /// How many parameters are shared.
+    pub fn n_shared(&self) -> usize {
+        self.g.len()
+    }
+
+    /// Adds a residual that depends on the shared parameters, too. The cost is added apart, by
+    /// [`add_cost`](Self::add_cost).
+    #[inline]
+    pub fn add_row(&mut self, row: &Row<B>, d_shared: &[f64]) {
+        self.add_block_rows(&[*row]);
+        let n = self.n_shared();
+        for i in 0..n {
+            let weighted = row.weight * d_shared[i];
+            for j in 0..B {
+                self.w[i][j] += weighted * row.d_block[j];
+            }
+            for j in 0..n {
+                self.u[i * n + j] += weighted * d_shared[j];
+            }
+            self.g[i] += weighted * row.residual;
+        }
+    }
+
+    /// Adds several residuals at once that depend on the block alone: the sums go through memory once for all of them.
     #[inline(always)]
-    pub fn add_rows<const R: usize>(&mut self, rows: &[Row<S, B>; R]) {
+    pub fn add_block_rows<const R: usize>(&mut self, rows: &[Row<B>; R]) {
         for i in 0..B {
             let mut sum = self.v[i];
             let mut right = self.h[i];
@@ -137,24 +167,6 @@ impl<const S: usize, const B: usize> BlockNormal<S, B> {
             self.v[i] = sum;
             self.h[i] = right;
         }
-        for i in 0..S {
-            let mut by_block = self.w[i];
-            let mut sum = self.u[i];
-            let mut right = self.g[i];
-            for row in rows {
-                let weighted = row.weight * row.d_shared[i];
-                for j in 0..B {
-                    by_block[j] += weighted * row.d_block[j];
-                }
-                for j in 0..S {
-                    sum[j] += weighted * row.d_shared[j];
-                }
-                right += weighted * row.residual;
-            }
-            self.w[i] = by_block;
-            self.u[i] = sum;
-            self.g[i] = right;
-        }
     }
 
     /// Room for so many loose parameters.
@@ -164,21 +176,18 @@ impl<const S: usize, const B: usize> BlockNormal<S, B> {
 
     /// The derivative of a row just added by a loose parameter. Rows of the same parameter come one after another.
     #[inline(always)]
-    pub fn add_loose(&mut self, row: &Row<S, B>, (parameter, d_loose): (usize, f64)) {
+    pub fn add_loose(
+        &mut self,
+        row: &Row<B>,
+        d_shared: &[f64],
+        (parameter, d_loose): (usize, f64),
+    ) {
         if self.loose.last().is_none_or(|last| last.parameter != parameter) {
-            self.loose.push(Loose {
-                parameter,
-                by_shared: [0.0; S],
-                by_itself: 0.0,
-                by_block: [0.0; B],
-                right: 0.0,
-            });
+            self.loose.push(Loose::zero(parameter));
         }
         let Some(loose) = self.loose.last_mut() else { return };
         let weighted = row.weight * d_loose;
-        for i in 0..S {
-            loose.by_shared[i] += weighted * row.d_shared[i];
-        }
+        loose.by_shared.iter_mut().zip(d_shared).for_each(|(by, d)| *by += weighted * d);
         for i in 0..B {
             loose.by_block[i] += weighted * row.d_block[i];
         }
@@ -192,10 +201,12 @@ impl<const S: usize, const B: usize> BlockNormal<S, B> {
     pub(crate) fn push_loose(
         &mut self,
         parameter: usize,
-        (by_shared, by_block): ([f64; S], [f64; B]),
+        (by_shared, by_block): (&[f64], [f64; B]),
         (by_itself, right): (f64, f64),
     ) {
-        self.loose.push(Loose { parameter, by_shared, by_itself, by_block, right });
+        let mut loose = Loose { by_itself, by_block, right, ..Loose::zero(parameter) };
+        loose.by_shared[..by_shared.len()].copy_from_slice(by_shared);
+        self.loose.push(loose);
     }
 
     /// Adds to the cost: half of ρ.
@@ -220,26 +231,29 @@ impl<const S: usize, const B: usize> BlockNormal<S, B> {
 
     #[inline(always)]
     fn eliminated(&self, damping: f64, into: &mut Reduced) -> Option<Eliminated<B>> {
+        let n_shared = self.n_shared();
         let mut v = self.v;
         for i in 0..B {
             v[i][i] *= 1.0 + damping;
         }
         let factor = Cholesky::new(&v)?;
         let z = factor.forward(&self.h);
-        let mut rows: Vec<(usize, [f64; B])> = Vec::with_capacity(S + self.loose.len());
-        rows.extend((0..S).map(|i| (i, factor.forward(&self.w[i]))));
-        rows.extend(self.loose.iter().map(|l| (S + l.parameter, factor.forward(&l.by_block))));
+        let mut rows: Vec<(usize, [f64; B])> = Vec::with_capacity(n_shared + self.loose.len());
+        rows.extend((0..n_shared).map(|i| (i, factor.forward(&self.w[i]))));
+        rows.extend(
+            self.loose.iter().map(|l| (n_shared + l.parameter, factor.forward(&l.by_block))),
+        );
         let n = into.n();
-        for i in 0..S {
+        for i in 0..n_shared {
             for j in 0..=i {
-                into.information[i * n + j] += self.u[i][j];
+                into.information[i * n + j] += self.u[i * n_shared + j];
             }
-            into.information[i * n + i] += damping * self.u[i][i];
+            into.information[i * n + i] += damping * self.u[i * n_shared + i];
             into.score[i] += self.g[i];
         }
         for loose in &self.loose {
-            let i = S + loose.parameter;
-            for j in 0..S {
+            let i = n_shared + loose.parameter;
+            for j in 0..n_shared {
                 into.information[i * n + j] += loose.by_shared[j];
             }
             into.information[i * n + i] += (1.0 + damping) * loose.by_itself;
@@ -247,7 +261,7 @@ impl<const S: usize, const B: usize> BlockNormal<S, B> {
         }
         let n_between = self.between.len().isqrt();
         for (i, row) in self.between.chunks(n_between.max(1)).enumerate() {
-            let sums = &mut into.information[(S + i) * n + S..][..i];
+            let sums = &mut into.information[(n_shared + i) * n + n_shared..][..i];
             sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += value);
         }
         // The products of one row with all before it, side by side; then each to its place.
@@ -277,6 +291,7 @@ impl<const S: usize, const B: usize> BlockNormal<S, B> {
 
     /// After a step of the shared and loose parameters and of its own.
     pub(super) fn follow(&mut self, border: &[f64], own: &[f64; B]) {
+        let n_shared = self.n_shared();
         // ½·δᵀ·(before + after) is what the step gains.
         let mut gain = 0.0;
         let lower = |i: usize, j: usize| (i.max(j), i.min(j));
@@ -288,39 +303,39 @@ impl<const S: usize, const B: usize> BlockNormal<S, B> {
                     self.v[a][b] * own[l]
                 })
                 .sum();
-            let by_shared: f64 = (0..S).map(|i| self.w[i][k] * border[i]).sum();
+            let by_shared: f64 = (0..n_shared).map(|i| self.w[i][k] * border[i]).sum();
             let by_loose: f64 =
-                self.loose.iter().map(|l| l.by_block[k] * border[S + l.parameter]).sum();
+                self.loose.iter().map(|l| l.by_block[k] * border[n_shared + l.parameter]).sum();
             h[k] -= by_own + by_shared + by_loose;
             gain += own[k] * (self.h[k] + h[k]);
         }
-        let mut g = self.g;
-        for i in 0..S {
-            let by_shared: f64 = (0..S)
+        let mut g = self.g.clone();
+        for i in 0..n_shared {
+            let by_shared: f64 = (0..n_shared)
                 .map(|j| {
                     let (a, b) = lower(i, j);
-                    self.u[a][b] * border[j]
+                    self.u[a * n_shared + b] * border[j]
                 })
                 .sum();
             let by_own: f64 = (0..B).map(|k| self.w[i][k] * own[k]).sum();
             let by_loose: f64 =
-                self.loose.iter().map(|l| l.by_shared[i] * border[S + l.parameter]).sum();
+                self.loose.iter().map(|l| l.by_shared[i] * border[n_shared + l.parameter]).sum();
             g[i] -= by_shared + by_own + by_loose;
             gain += border[i] * (self.g[i] + g[i]);
         }
         let n = self.between.len().isqrt();
         for loose in &mut self.loose {
             let (at, before) = (loose.parameter, loose.right);
-            let by_shared: f64 = (0..S).map(|i| loose.by_shared[i] * border[i]).sum();
+            let by_shared: f64 = (0..n_shared).map(|i| loose.by_shared[i] * border[i]).sum();
             let by_own: f64 = (0..B).map(|k| loose.by_block[k] * own[k]).sum();
             let by_others: f64 = (0..n)
                 .map(|other| {
                     let (a, b) = lower(at, other);
-                    self.between[a * n + b] * border[S + other]
+                    self.between[a * n + b] * border[n_shared + other]
                 })
                 .sum();
-            loose.right -= by_shared + by_own + by_others + loose.by_itself * border[S + at];
-            gain += border[S + at] * (before + loose.right);
+            loose.right -= by_shared + by_own + by_others + loose.by_itself * border[n_shared + at];
+            gain += border[n_shared + at] * (before + loose.right);
         }
         (self.h, self.g) = (h, g);
         self.cost -= 0.5 * gain;
@@ -347,8 +362,8 @@ impl<const S: usize, const B: usize> BlockNormal<S, B> {
     }
 
     /// The diagonal of U: what the block would say about each shared parameter if all others were known.
-    pub fn shared_diagonal(&self) -> [f64; S] {
-        std::array::from_fn(|i| self.u[i][i])
+    pub fn shared_diagonal(&self) -> impl Iterator<Item = f64> {
+        self.u.iter().step_by(self.n_shared() + 1).copied()
     }
 
     /// (V)⁻¹, the covariance of the block's own parameters for unit variance with the others known, and how these
@@ -358,11 +373,11 @@ impl<const S: usize, const B: usize> BlockNormal<S, B> {
         let factor = Cholesky::new(&self.v)?;
         let mut follows = vec![[0.0; B]; n];
         let minus = |row: &[f64; B]| factor.solve(row).map(|x| -x);
-        for i in 0..S {
-            follows[i] = minus(&self.w[i]);
+        for (follows, by_block) in follows.iter_mut().zip(&self.w) {
+            *follows = minus(by_block);
         }
         for loose in &self.loose {
-            follows[S + loose.parameter] = minus(&loose.by_block);
+            follows[self.n_shared() + loose.parameter] = minus(&loose.by_block);
         }
         Some((factor.inverse(), follows))
     }
@@ -418,9 +433,9 @@ struct Eliminated<const B: usize> {
 
 /// Shared and loose parameters and all blocks: a state, or a step of one.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Arrow<const S: usize, T> {
+pub struct Arrow<T> {
     /// The shared parameters.
-    pub shared: [f64; S],
+    pub shared: Vec<f64>,
     /// The loose parameters.
     pub loose: Vec<f64>,
     /// The blocks.
@@ -429,9 +444,9 @@ pub struct Arrow<const S: usize, T> {
 
 /// The normal equations of a [`Bordered`] problem.
 #[derive(Clone, Debug)]
-pub struct ArrowNormal<const S: usize, const B: usize> {
+pub struct ArrowNormal<const B: usize> {
     /// What each block contributes.
-    pub blocks: Vec<BlockNormal<S, B>>,
+    pub blocks: Vec<BlockNormal<B>>,
     /// What is known beforehand.
     pub prior: Reduced,
     prior_cost: f64,
@@ -439,15 +454,15 @@ pub struct ArrowNormal<const S: usize, const B: usize> {
 
 /// A [`Bordered`] problem as [`minimize`](super::minimize) takes it.
 #[derive(Clone, Copy, Debug)]
-pub struct BySchur<'a, P, const S: usize, const B: usize>(pub &'a P);
+pub struct BySchur<'a, P, const B: usize>(pub &'a P);
 
-impl<P: Bordered<S, B>, const S: usize, const B: usize> LeastSquares for BySchur<'_, P, S, B> {
-    type State = Arrow<S, P::Block>;
-    type Normal = ArrowNormal<S, B>;
-    type Step = Arrow<S, [f64; B]>;
+impl<P: Bordered<B>, const B: usize> LeastSquares for BySchur<'_, P, B> {
+    type State = Arrow<P::Block>;
+    type Normal = ArrowNormal<B>;
+    type Step = Arrow<[f64; B]>;
 
     fn linearize(&self, state: &Self::State) -> Option<Self::Normal> {
-        let mut blocks = vec![BlockNormal::ZERO; state.blocks.len()];
+        let mut blocks = vec![BlockNormal::zero(state.shared.len()); state.blocks.len()];
         for (index, (block, normal)) in state.blocks.iter().zip(&mut blocks).enumerate() {
             if !self.0.linearize_block(index, &state.shared, &state.loose, block, normal) {
                 return None;
@@ -480,6 +495,7 @@ impl<P: Bordered<S, B>, const S: usize, const B: usize> LeastSquares for BySchur
             let damped = damping * prior.information[i * n + i] * border[i];
             decrease += border[i] * (damped + prior.score[i]);
         }
+        let n_shared = normal.first().map_or(n, BlockNormal::n_shared);
         for (block, Eliminated { factor, rows, z }) in normal.iter().zip(&eliminated) {
             let mut rest = *z;
             for (i, y) in rows {
@@ -487,11 +503,12 @@ impl<P: Bordered<S, B>, const S: usize, const B: usize> LeastSquares for BySchur
                     rest[k] -= y[k] * border[*i];
                 }
             }
-            for i in 0..S {
-                decrease += border[i] * (damping * block.u[i][i] * border[i] + block.g[i]);
+            for i in 0..n_shared {
+                decrease +=
+                    border[i] * (damping * block.u[i * n_shared + i] * border[i] + block.g[i]);
             }
             for loose in &block.loose {
-                let step = border[S + loose.parameter];
+                let step = border[n_shared + loose.parameter];
                 decrease += step * (damping * loose.by_itself * step + loose.right);
             }
             let step = factor.backward(&rest);
@@ -500,16 +517,14 @@ impl<P: Bordered<S, B>, const S: usize, const B: usize> LeastSquares for BySchur
             }
             blocks.push(step);
         }
-        let shared = std::array::from_fn(|i| border[i]);
-        let step = Arrow { shared, loose: border[S..].to_vec(), blocks };
+        let (shared, loose) = border.split_at(n_shared);
+        let step = Arrow { shared: shared.to_vec(), loose: loose.to_vec(), blocks };
         Some(Solution { step, predicted_decrease: 0.5 * decrease })
     }
 
     fn advance(&self, state: &Self::State, step: &Self::Step) -> Self::State {
-        let mut shared = state.shared;
-        for i in 0..S {
-            shared[i] += step.shared[i];
-        }
+        let shared =
+            state.shared.iter().zip(&step.shared).map(|(value, step)| value + step).collect();
         let loose = state.loose.iter().zip(&step.loose).map(|(value, step)| value + step).collect();
         let blocks = state
             .blocks
@@ -534,10 +549,11 @@ impl<P: Bordered<S, B>, const S: usize, const B: usize> LeastSquares for BySchur
     }
 }
 
-impl<P: Bordered<S, B>, const S: usize, const B: usize> BySchur<'_, P, S, B> {
+impl<P: Bordered<B>, const B: usize> BySchur<'_, P, B> {
     /// What is known beforehand, and what it costs at a state.
-    fn prior(&self, state: &Arrow<S, P::Block>) -> (Reduced, f64) {
-        let n = S + state.loose.len();
+    fn prior(&self, state: &Arrow<P::Block>) -> (Reduced, f64) {
+        let n_shared = state.shared.len();
+        let n = n_shared + state.loose.len();
         let mut prior = Reduced::zero(n);
         let mut cost = 0.0;
         for (i, precision) in self.0.shared_precision().into_iter().enumerate() {
@@ -547,9 +563,9 @@ impl<P: Bordered<S, B>, const S: usize, const B: usize> BySchur<'_, P, S, B> {
         }
         let precision = self.0.loose_precision();
         for (i, row) in precision.chunks(state.loose.len().max(1)).enumerate() {
-            prior.information[(S + i) * n + S..][..row.len()].copy_from_slice(row);
+            prior.information[(n_shared + i) * n + n_shared..][..row.len()].copy_from_slice(row);
             let dot: f64 = row.iter().zip(&state.loose).map(|(p, x)| p * x).sum();
-            prior.score[S + i] = -dot;
+            prior.score[n_shared + i] = -dot;
             cost += 0.5 * dot * state.loose[i];
         }
         (prior, cost)
@@ -571,17 +587,18 @@ pub(super) mod tests {
         curves: Vec<Vec<(f64, f64)>>,
     }
 
-    impl Bordered<2, 2> for Decays {
+    impl Bordered<2> for Decays {
         type Block = [f64; 2];
 
         fn linearize_block(
             &self,
             index: usize,
-            &[k, c]: &[f64; 2],
+            shared: &[f64],
             loose: &[f64],
             &[a, b]: &[f64; 2],
-            normal: &mut BlockNormal<2, 2>,
+            normal: &mut BlockNormal<2>,
         ) -> bool {
+            let (k, c) = (shared[0], shared[1]);
             for &(t, y) in &self.curves[index] {
                 let e = math::exp(-k * t);
                 let parameter = (10.0 * t / 3.0).round() as usize;
@@ -590,18 +607,18 @@ pub(super) mod tests {
                 let bump = bump.copied().unwrap_or(0.0);
                 let residual = y - (a * e + b + c * t * t * (1.0 + bump));
                 let by_shared = [-t * a * e, t * t * (1.0 + bump)];
-                let row = Row { weight: 1.0, residual, d_shared: by_shared, d_block: [e, 1.0] };
-                normal.add_rows(&[row]);
+                let row = Row { weight: 1.0, residual, d_block: [e, 1.0] };
+                normal.add_row(&row, &by_shared);
                 if parameter.is_multiple_of(10) && !loose.is_empty() {
-                    normal.add_loose(&row, (parameter / 10, c * t * t));
+                    normal.add_loose(&row, &by_shared, (parameter / 10, c * t * t));
                 }
                 normal.add_cost(0.5 * residual * residual);
             }
             k > 0.0
         }
 
-        fn shared_precision(&self) -> [f64; 2] {
-            self.precision
+        fn shared_precision(&self) -> Vec<f64> {
+            self.precision.to_vec()
         }
 
         fn loose_precision(&self) -> &[f64] {
@@ -613,7 +630,7 @@ pub(super) mod tests {
         }
     }
 
-    pub(in crate::solve) fn decays(noise: f64) -> (Decays, Arrow<2, [f64; 2]>) {
+    pub(in crate::solve) fn decays(noise: f64) -> (Decays, Arrow<[f64; 2]>) {
         let truth = [[3.0, 1.0], [-2.0, 0.5], [1.0, 4.0]];
         let curves = truth
             .iter()
@@ -630,7 +647,7 @@ pub(super) mod tests {
             .collect();
         (
             Decays { precision: [0.0; 2], loose_precision: Vec::new(), curves },
-            Arrow { shared: [0.4, 0.0], loose: Vec::new(), blocks: vec![[1.0, 0.0]; 3] },
+            Arrow { shared: vec![0.4, 0.0], loose: Vec::new(), blocks: vec![[1.0, 0.0]; 3] },
         )
     }
 
@@ -665,7 +682,7 @@ pub(super) mod tests {
                     right[i] += block.g[i];
                     right[at + i] = block.h[i];
                     for j in 0..2 {
-                        whole[i][j] += block.u[i.max(j)][i.min(j)];
+                        whole[i][j] += block.u[2 * i.max(j) + i.min(j)];
                         whole[at + i][at + j] = block.v[i.max(j)][i.min(j)];
                         whole[at + j][i] = block.w[i][j];
                         whole[i][at + j] = block.w[i][j];
