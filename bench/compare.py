@@ -104,7 +104,8 @@ def whole_job(truedepth, old, recording, runs):
     row("truedepth audit", best(auto))
     print(f"  (OpenCV without starting Python and importing: {inside_s:.3f} s)")
     numbers(f"OpenCV {result['opencv']}, Python", result["focal_px"], result)
-    numbers("truedepth audit --method paper", audit["calibration"]["focal_px"], audit["depth"])
+    errors = {f"{whose}_median_error_mm": 1e3 * audit["depth"][f"{whose}_median_error_m"]["value"] for whose in ("factory", "own")}
+    numbers("truedepth audit --method paper", audit["calibration"]["focal_px"]["value"], errors)
 
 
 def best(runs):

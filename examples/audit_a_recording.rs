@@ -15,7 +15,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let recording = Recording::open(path, &Limits::default())?;
     let audit = audit(&recording, &Options::new(Method::Auto), &Silent)?;
     for finding in &audit.findings {
-        println!("{} {:<12} {}", finding.code, finding.verdict.name(), finding.summary);
+        println!("{} {:<12} {}", finding.code, finding.verdict.name(), finding.summary());
     }
     if let Some(calibration) = &audit.calibration {
         let focal_px = calibration.focal_px();

@@ -1,5 +1,5 @@
-//! A recording that never touches the disk: simulated with a wrong focal length and stretched depth, audited, corrected,
-//! and audited again. `cargo run --release --example correct_in_memory`
+//! A recording that never touches the disk: simulated with a wrong focal length and stretched depth, audited,
+//! corrected, and audited again. `cargo run --release --example correct_in_memory`
 
 use std::{error::Error, sync::Arc};
 

@@ -6,7 +6,7 @@
 //! environment or the network; only [`files`] opens files, and only with the default feature `fs`.
 //!
 //! The flow of data is the flow of types: [`recording::Recording`] → [`detect::Observation`] → [`pose::View`] →
-//! [`calibrate::Calibration`] → [`depth::BoardDepth`] → [`diagnose::Finding`] → [`report::wire`].
+//! [`calibrate::Calibration`] → [`depth::BoardDepth`] → [`diagnose::Finding`] → [`wire`].
 //!
 //! Conventions (pixel centres at integers, metres, NaN for "no measurement", `a_from_b`) are stated once, in
 //! `CONVENTIONS.md`.
@@ -82,8 +82,8 @@ pub mod correct;
 // The paper's tables and figures, from its published data.
 pub mod reproduce;
 
-// What leaves the library: JSON, HTML, SVG.
-pub mod report;
+// For programs: JSON, and calibrations as other programs read them.
+pub mod wire;
 
-// A calibration as other programs read it.
-pub mod export;
+// For readers: HTML, SVG, words.
+pub mod report;

@@ -15,8 +15,10 @@ pub(crate) use pictures::{DepthRange, OverlayArgs, UndistortArgs};
 use truedepth::{
     board::{self, CharucoBoard, Dictionary},
     calibrate::Model,
+    diagnose::{ToleranceError, Tolerances},
     recording::DefectError,
     simulate::{Device, Faults},
+    wire::Detail,
 };
 
 /// Is the depth of an Apple TrueDepth recording true? And if not: what is wrong, by how much, how sure, what fixes it?
@@ -292,6 +294,20 @@ pub(crate) struct JsonArgs {
     pub(crate) json: bool,
 }
 
+/// How much JSON says.
+#[derive(Debug, clap::Args)]
+pub(crate) struct DetailArgs {
+    /// Say corners, residuals and poses of every frame in the JSON, too
+    #[arg(long)]
+    pub(crate) detail: bool,
+}
+
+impl DetailArgs {
+    pub(crate) fn detail(&self) -> Detail {
+        if self.detail { Detail::Frames } else { Detail::Summary }
+    }
+}
+
 #[derive(Debug, clap::Args)]
 pub(crate) struct AuditArgs {
     /// Recordings: folders as the capture app writes them, or zips of them
@@ -321,12 +337,8 @@ pub(crate) struct AuditArgs {
     pub(crate) input: InputArgs,
 
     /// What still counts as true, like focal=0.5%; may be given several times
-    ///
-    /// A significant deviation beyond it is a fault. One of focal=1%, principal-point=2px, depth-scale=1%,
-    /// depth-bias=3mm, distortion=1px (at the corner of the image), zoom=1% and shift=1px (of depth against colour);
-    /// these values are the defaults.
-    #[arg(long = "tolerance", value_name = "NAME=VALUE", value_parser = tolerance)]
-    pub(crate) tolerances: Vec<Tolerance>,
+    #[arg(long = "tolerance", value_name = "NAME=VALUE", value_parser = tolerance, long_help = tolerance_help())]
+    pub(crate) tolerances: Vec<String>,
 
     /// Take the camera from this file instead of calibrating
     ///
@@ -342,6 +354,9 @@ pub(crate) struct AuditArgs {
     #[arg(long)]
     pub(crate) json: bool,
 
+    #[command(flatten)]
+    pub(crate) detail: DetailArgs,
+
     /// Open the report in a browser
     #[arg(long)]
     pub(crate) open: bool,
@@ -353,43 +368,19 @@ Examples:
   truedepth audit Archive.zip -o reports
   truedepth audit shots --board 10x8:20.875mm:10.4375mm:ARUCO_ORIGINAL
   truedepth calibrate moving --json > camera.json && truedepth audit still --calibration camera.json
-  truedepth audit my-recording --json | jq '.findings[] | select(.severity == \"fault\")'";
+  truedepth audit my-recording --json | jq '.findings[] | select(.verdict == \"fault\")'";
 
-/// What still counts as true, in the library's units.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Tolerance {
-    Focal(f64),
-    DepthScale(f64),
-    DepthBiasM(f64),
-    DistortionPx(f64),
-    PrincipalPointPx(f64),
-    Zoom(f64),
-    ShiftPx(f64),
+fn tolerance(text: &str) -> Result<String, ToleranceError> {
+    Tolerances::default().with(text).map(|_| text.to_owned())
 }
 
-fn tolerance(text: &str) -> Result<Tolerance, String> {
-    const FORMS: &str = "focal=1%, principal-point=2px, depth-scale=1%, depth-bias=3mm, distortion=1px, zoom=1% \
-                         or shift=1px";
-    let wrong = || format!("write {FORMS}");
-    let (name, value) = text.split_once('=').ok_or_else(wrong)?;
-    let number = |unit: &str| -> Result<f64, String> {
-        let number: f64 =
-            value.strip_suffix(unit).ok_or_else(wrong)?.trim().parse().map_err(|_| wrong())?;
-        if number.is_finite() && number >= 0.0 { Ok(number) } else { Err(wrong()) }
-    };
-    match name {
-        "focal" => Ok(Tolerance::Focal(number("%")? / 100.0)),
-        "depth-scale" => Ok(Tolerance::DepthScale(number("%")? / 100.0)),
-        "depth-bias" => match board::length_m(value) {
-            Ok(bias_m) if bias_m >= 0.0 => Ok(Tolerance::DepthBiasM(bias_m)),
-            _ => Err(wrong()),
-        },
-        "distortion" => Ok(Tolerance::DistortionPx(number("px")?)),
-        "principal-point" => Ok(Tolerance::PrincipalPointPx(number("px")?)),
-        "zoom" => Ok(Tolerance::Zoom(number("%")? / 100.0)),
-        "shift" => Ok(Tolerance::ShiftPx(number("px")?)),
-        _ => Err(wrong()),
-    }
+fn tolerance_help() -> String {
+    format!(
+        "What still counts as true, like focal=0.5%; may be given several times\n\n\
+         A significant deviation beyond it is a fault. These values are the defaults: {} (distortion at the corner of \
+         the image, zoom and shift of depth against colour).",
+        Tolerances::defaults()
+    )
 }
 
 #[derive(Debug, clap::Args)]
@@ -426,6 +417,9 @@ pub(crate) struct CalibrateArgs {
 
     #[command(flatten)]
     pub(crate) json: JsonArgs,
+
+    #[command(flatten)]
+    pub(crate) detail: DetailArgs,
 
     /// Write the calibration for another program
     ///
@@ -767,20 +761,6 @@ mod tests {
             let examples = verb.get_after_help().map(ToString::to_string).unwrap_or_default();
             assert!(examples.contains(&format!("truedepth {name}")), "{name}");
             assert!(verb.get_about().is_some(), "{name}");
-        }
-    }
-
-    #[test]
-    fn tolerances_carry_their_unit() {
-        assert_eq!(tolerance("focal=0.5%"), Ok(Tolerance::Focal(0.005)));
-        assert_eq!(tolerance("depth-bias=2mm"), Ok(Tolerance::DepthBiasM(0.002)));
-        assert_eq!(tolerance("distortion=0.5px"), Ok(Tolerance::DistortionPx(0.5)));
-        assert_eq!(tolerance("zoom=2%"), Ok(Tolerance::Zoom(0.02)));
-        assert_eq!(tolerance("shift=0.5px"), Ok(Tolerance::ShiftPx(0.5)));
-        for text in
-            ["focal", "focal=1", "focal=-1%", "focal=nan%", "depth-bias=3", "vocal=1%", "focal=1px"]
-        {
-            assert!(tolerance(text).unwrap_err().contains("focal=1%"), "{text}");
         }
     }
 

@@ -14,7 +14,7 @@ use truedepth::{
     files::{Limits, Paths},
     image,
     recording::{self, Found, Recording, board_from_toml},
-    report::wire::{self, Document},
+    wire,
 };
 
 use crate::{
@@ -36,8 +36,8 @@ pub(crate) fn limits(args: &InputArgs) -> Limits {
     }
 }
 
-/// The recordings in a folder or archive; their metadata are not read yet. Folders of images alone are none: there is no
-/// depth in them to look at.
+/// The recordings in a folder or archive; their metadata are not read yet. Folders of images alone are none: there is
+/// no depth in them to look at.
 pub(crate) fn recordings(path: &Path, args: &InputArgs) -> Result<Vec<Found>, Failure> {
     let found = recording::discover(path, &limits(args))?;
     match found.iter().find(|found| !found.format.has_depth) {
@@ -187,32 +187,30 @@ fn text_of(path: &Path) -> Result<String, Failure> {
     fs::read_to_string(path).map_err(|e| unreadable(path, e))
 }
 
-/// A document that some verb wrote.
-pub(crate) fn document(path: &Path) -> Result<Document, Failure> {
+/// A calibration, or the report of an audit.
+pub(crate) fn document(path: &Path) -> Result<wire::Input, Failure> {
     let within = |failure: Failure| failure.within(format!("cannot use {}", path.display()));
-    Document::from_json(&text_of(path)?).map_err(|e| within(e.into()))
+    wire::Input::from_json(&text_of(path)?).map_err(|e| within(e.into()))
 }
 
 /// The camera that `truedepth calibrate --json` or `audit --json` wrote.
 pub(crate) fn camera(path: &Path) -> Result<Camera, Failure> {
-    calibration(path)?.camera().map_err(|e| no_calibration(path, e.into()))
+    known(path)?.camera().map_err(|e| no_calibration(path, e.into()))
 }
 
 /// The same with what the calibration knows of its errors.
 pub(crate) fn known_camera(path: &Path) -> Result<KnownCamera, Failure> {
-    calibration(path)?.known().map_err(|e| no_calibration(path, e.into()))
+    known(path)?.known().map_err(|e| no_calibration(path, e.into()))
 }
 
-fn calibration(path: &Path) -> Result<wire::Calibration, Failure> {
+fn known(path: &Path) -> Result<wire::Known, Failure> {
     let wrong = |failure: Failure| no_calibration(path, failure);
     let text = fs::read_to_string(path).map_err(|e| unreadable(path, e))?;
-    match Document::from_json(&text).map_err(|e| wrong(e.into()))? {
-        Document::Calibrate(calibration) => Ok(*calibration),
-        Document::Audit(audit) => {
+    match wire::Input::from_json(&text).map_err(|e| wrong(e.into()))? {
+        wire::Input::Calibration(known) => Ok(*known),
+        wire::Input::Audit(audit) => {
             audit.calibration.ok_or_else(|| wrong(Failure::new("this audit did not calibrate")))
         }
-        Document::Detect(_) => Err(wrong(Failure::new("it holds detected corners"))),
-        _ => Err(wrong(Failure::new("it is the result of another verb"))),
     }
 }
 

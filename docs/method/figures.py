@@ -31,10 +31,10 @@ def boards(calibrations):
     cell, parts, top = 26, [], 40
     for i, calibration in enumerate(calibrations):
         left, surface = 12 + i * (COLUMNS * cell + 24), calibration["board_surface"]
-        size, sigma = surface["peak_to_valley_mm"], surface["peak_to_valley_sigma_mm"]
+        size, sigma = (1e3 * surface["peak_to_valley_m"][of] for of in ("value", "sigma"))
         parts.append(text(left, 16, calibration["recording"], 12))
         parts.append(text(left, 31, f"{size:.3f} ± {sigma:.3f} mm from crest to trough"))
-        for id, height in enumerate(surface["heights_mm"]):
+        for id, height in enumerate(1e3 * z for z in surface["heights_m"]):
             x, y = left + id % COLUMNS * cell, top + id // COLUMNS * cell
             parts.append(f'<rect x="{x}" y="{y}" width="{cell}" height="{cell}" fill="{colour(height / 0.5)}"/>')
             parts.append(text(x + cell / 2, y + cell / 2 + 3, f"{1000 * height:+.0f}".replace("-", "−"), 8, "middle"))

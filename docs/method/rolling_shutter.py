@@ -143,7 +143,7 @@ def load(detect_json, calibrate_json):
         views.append((ids, seen, 1 / (sigma**2 + FLOOR_PX**2)))
         frames.append(view["frame"])
         poses.append((turn(np.array(view["rotation_vector_rad"])), np.array(view["translation_m"]), np.zeros(6)))
-    start = np.r_[calibration["focal_px"], calibration["principal_point_px"], np.zeros(5 + len(BOARD))]
+    start = np.r_[calibration["focal_px"]["value"], calibration["principal_point_px"], np.zeros(5 + len(BOARD))]
     return views, poses, start, calibration["image_size_px"], frames, calibration["recording"]
 
 

@@ -19,13 +19,15 @@
 //! let recording = Recording::open("ipad", &Limits::default())?;
 //! let audit = audit(&recording, &Options::new(Method::Auto), &Silent)?;
 //! for finding in &audit.findings {
-//!     println!("{} {}: {}", finding.code, finding.verdict.name(), finding.summary);
+//!     println!("{} {}: {}", finding.code, finding.verdict.name(), finding.claim);
 //! }
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
 //! Not here: reading arguments, printing, time; pictures and files ([`report`](crate::report)).
 
+#[cfg(test)]
+pub(crate) mod sample;
 #[cfg(test)]
 mod tests;
 

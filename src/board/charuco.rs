@@ -6,7 +6,8 @@ use super::{Dictionary, Error, length_m, length_text};
 use crate::geom::{Board, Point};
 
 /// Which squares are white. OpenCV changed it in 4.6; the two differ only for boards with an even number of rows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Layout {
     /// Before OpenCV 4.6: the last row starts black, so with an even number of rows the first square is white.
     Legacy,

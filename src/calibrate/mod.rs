@@ -210,7 +210,7 @@ impl Calibration {
 }
 
 /// A choice of the most telling views.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Chosen {
     /// Views that could have taken part.
     pub n_usable: usize,
@@ -223,7 +223,8 @@ pub struct Chosen {
 }
 
 /// The shape of a board, as it is estimated with the camera.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum SurfaceKind {
     /// A plane.
     Flat,
@@ -247,7 +248,7 @@ impl SurfaceKind {
 }
 
 /// One shape of the board tried.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct SurfaceCandidate {
     /// Which.
     pub kind: SurfaceKind,
@@ -264,7 +265,7 @@ pub struct SurfaceCandidate {
 }
 
 /// The calibration without one picture.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct LeftOutPicture {
     /// The frames of this picture.
     pub frames: Vec<usize>,
@@ -281,7 +282,7 @@ pub struct LeftOutPicture {
 /// again: where `residual_share` is below 0.8, what the principal point would change by is added to its σ; between
 /// 0.9 and 0.8 a growing part of it.
 /// Said beside the result so that who wants better holds the device still.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct RollingShutter {
     /// How far a view turns while all rows are read (one standard deviation, radians): the likeliest of 4, 2, 1 and
     /// 0.5 mrad, half a millimetre of shift going with each milliradian.
@@ -301,7 +302,7 @@ impl RollingShutter {
 }
 
 /// How a board deviates from a flat one, estimated with the camera.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct BoardSurface {
     /// Which form was fitted; never [`SurfaceKind::Flat`].
     pub kind: SurfaceKind,
@@ -349,7 +350,7 @@ impl BoardSurface {
 }
 
 /// A number and how sure we are of it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Estimate {
     /// The value.
     pub value: f64,
@@ -386,11 +387,12 @@ impl KnownCamera {
 }
 
 /// One free parameter.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Parameter {
     /// `focal_px`, `center_x_px`, `center_y_px`, `k1`, ...
     pub name: &'static str,
     /// Value and standard deviation.
+    #[serde(flatten)]
     pub estimate: Estimate,
 }
 
@@ -402,7 +404,7 @@ impl Parameter {
 }
 
 /// One model tried.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Candidate {
     /// Which.
     pub model: Model,
@@ -422,7 +424,7 @@ pub struct Candidate {
 }
 
 /// A corner that disagrees with all others.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Outlier {
     /// Frame index.
     pub frame: usize,
@@ -435,11 +437,12 @@ pub struct Outlier {
 }
 
 /// A frame that took no part.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct RejectedFrame {
     /// Frame index.
     pub frame: usize,
     /// Why.
+    #[serde(flatten)]
     pub reason: Rejection,
 }
 
@@ -497,6 +500,17 @@ impl Rejection {
     }
 }
 
+impl serde::Serialize for Rejection {
+    /// Its name, and the sentence.
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        use serde::ser::SerializeMap;
+        let mut map = serializer.serialize_map(Some(2))?;
+        map.serialize_entry("reason", self.name())?;
+        map.serialize_entry("why", &self.to_string())?;
+        map.end()
+    }
+}
+
 impl fmt::Display for Rejection {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -525,7 +539,7 @@ impl fmt::Display for Rejection {
 
 /// How much of the lens' distortion is left in the stream, from the pixels alone. Focal length and principal point are
 /// free in every hypothesis.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct DistortionTest {
     /// The share a of the inverse table that straightens the stream best, p' = c + (1 + a·m(r))·(p − c): 0 where the
     /// stream is rectified, 1 where it is as the lens drew it, −1 where it was rectified twice. `None` without tables.
@@ -544,7 +558,7 @@ pub struct DistortionTest {
 }
 
 /// One assumption about the stream, and how well it explains the corners.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Hypothesis {
     /// Which.
     pub lens: Lens,
@@ -561,7 +575,8 @@ pub struct Hypothesis {
 }
 
 /// What lies between the stream and a pinhole.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Lens {
     /// Nothing: the stream is rectified.
     None,

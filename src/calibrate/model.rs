@@ -20,6 +20,12 @@ pub enum Model {
     BrownAspect,
 }
 
+impl serde::Serialize for Model {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
 impl Model {
     /// All of them, simplest first.
     pub const ALL: [Self; 6] = [

@@ -109,7 +109,7 @@ fn about_camera(pose: &Pose<Color, Board>, step: &[f64; 6]) -> [f64; 6] {
 }
 
 /// How far off the calibration may draw a point, over the image, for points at one depth.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct ProjectionUncertainty {
     /// Places across the image.
     pub columns: usize,
@@ -118,12 +118,13 @@ pub struct ProjectionUncertainty {
     /// How far the points are in front of the camera (z), metres.
     pub depth_m: f64,
     /// The pixel of each place, row by row from the top left.
+    #[serde(skip)]
     pub pixels: Vec<Pixel>,
     /// One standard deviation of the projection in its worst direction, pixels, row by row; NaN where the lens model
     /// covers nothing.
     pub sigma_px: Vec<f64>,
-    /// The same sideways at `depth_m`, millimetres.
-    pub sigma_mm: Vec<f64>,
+    /// The same sideways at `depth_m`, metres.
+    pub sigma_m: Vec<f64>,
 }
 
 impl Calibration {
@@ -158,8 +159,8 @@ impl Calibration {
                 sigma_px.push(disturbed.sigma_px(motion, pixel, depth_m).unwrap_or(f64::NAN));
             }
         }
-        let sigma_mm = sigma_px.iter().map(|s| 1e3 * s * depth_m / focal_px).collect();
-        Some(ProjectionUncertainty { columns, rows, depth_m, pixels, sigma_px, sigma_mm })
+        let sigma_m = sigma_px.iter().map(|s| s * depth_m / focal_px).collect();
+        Some(ProjectionUncertainty { columns, rows, depth_m, pixels, sigma_px, sigma_m })
     }
 }
 

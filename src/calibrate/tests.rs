@@ -515,8 +515,8 @@ fn projection_is_least_known_where_nothing_was_seen() {
     assert!(whole.unknown_px().is_some_and(|px| px > 1.0));
     assert!(simple_grid.sigma_px.iter().all(|s| *s < 0.5), "{:?}", simple_grid.sigma_px);
     assert!(simple.unknown_px().is_none());
-    let mm = 1e3 * 0.3 / whole.camera.intrinsics.focal_px();
-    assert!((whole_grid.sigma_mm[3] / whole_grid.sigma_px[3] - mm).abs() < 1e-12);
+    let m = 0.3 / whole.camera.intrinsics.focal_px();
+    assert!((whole_grid.sigma_m[3] / whole_grid.sigma_px[3] - m).abs() < 1e-15);
     assert!(whole.projection_uncertainty(1, 5, 0.3).is_none());
     assert!(whole.projection_uncertainty(5, 5, 0.0).is_none());
     // Without each picture the focal length moves by less than a few of its σ.

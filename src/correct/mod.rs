@@ -20,7 +20,7 @@
 //! ```
 //!
 //! Not here: what is wrong ([`diagnose`](crate::diagnose)), the spelling of `provenance.json`
-//! ([`report::wire`](crate::report::wire)).
+//! ([`wire`](crate::wire)).
 
 mod error;
 mod job;

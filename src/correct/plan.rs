@@ -6,7 +6,7 @@ use super::Error;
 use crate::{
     audit::Audit,
     camera::{Camera, Distortion, Intrinsics},
-    diagnose::{Code, Verdict},
+    diagnose::{Code, Finding, Verdict},
     recording::{Defect, Factory},
 };
 
@@ -142,8 +142,7 @@ impl Plan {
     /// Removes what an audit has found.
     pub fn of_audit(audit: &Audit, selection: Selection<'_>) -> Result<Self, Error> {
         let has_tables = audit.factory.as_ref().is_some_and(|factory| factory.tables.is_some());
-        let found = audit.findings.iter().filter_map(|f| Some((f.code, f.verdict, f.defect?)));
-        Self::of_findings(found, audit.camera.as_ref().filter(|_| !has_tables), selection)
+        Self::of_findings(&audit.findings, audit.camera.as_ref().filter(|_| !has_tables), selection)
     }
 
     /// Removes what findings of an audit name; `camera` is the own camera of a recording without lookup tables.
@@ -153,16 +152,15 @@ impl Plan {
     /// others. Where a finding says that images are mirrored, what findings have read across mirrored images is
     /// dropped (of depth alone: all of depth; of both: principal point and shift): audit the result.
     pub fn of_findings(
-        found: impl IntoIterator<Item = (Code, Verdict, Defect)>,
+        findings: &[Finding],
         camera: Option<&Camera>,
         selection: Selection<'_>,
     ) -> Result<Self, Error> {
-        let found: Vec<(Code, Verdict, Defect)> = found.into_iter().collect();
+        let found = || findings.iter().filter_map(|f| Some((f.code, f.verdict, f.defect?)));
         let is_line = |defect: &Defect| defect.step() == "depth";
-        let line_at_fault =
-            found.iter().any(|(_, v, defect)| is_line(defect) && *v == Verdict::Fault);
+        let line_at_fault = found().any(|(_, v, defect)| is_line(&defect) && v == Verdict::Fault);
         let mut steps: Vec<Step> = Vec::new();
-        for (code, verdict, defect) in found {
+        for (code, verdict, defect) in found() {
             let is_taken = match selection {
                 Selection::Faults => {
                     verdict == Verdict::Fault || (line_at_fault && is_line(&defect))
@@ -356,6 +354,7 @@ impl Plan {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagnose::Tolerances;
 
     const SAID: Intrinsics =
         Intrinsics { fx: 565.0, fy: 566.0, cx: 320.0, cy: 241.0, width: 640, height: 480 };
@@ -402,7 +401,13 @@ mod tests {
     fn findings_become_steps() {
         let camera = Camera { intrinsics: SAID, distortion: Distortion::None };
         let by = |found: &[(Code, Verdict, Defect)], camera: Option<&Camera>, selection| {
-            Plan::of_findings(found.iter().copied(), camera, selection)
+            let finding = |&(code, verdict, defect): &(Code, Verdict, Defect)| Finding {
+                verdict,
+                defect: Some(defect),
+                ..Finding::new(code, &Tolerances::default())
+            };
+            let findings: Vec<Finding> = found.iter().map(finding).collect();
+            Plan::of_findings(&findings, camera, selection)
         };
         let names = |plan: &Plan| -> Vec<&str> {
             plan.steps().iter().map(|step| step.defect.name()).collect()

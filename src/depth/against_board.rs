@@ -15,13 +15,14 @@ use crate::{
 pub const MAX_ERROR_M: f64 = 0.020;
 
 /// One corner of the board where the sensor measured.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Sample {
     /// Index of the frame in the recording.
     pub frame: usize,
     /// Id of the corner.
     pub corner: usize,
     /// Where the corner was observed, and the depth map read.
+    #[serde(flatten)]
     pub pixel: Pixel,
     /// Depth of the corner as the board's pose tells it, metres.
     pub board_m: f64,
@@ -37,11 +38,12 @@ impl Sample {
 }
 
 /// One frame's depth against the board.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct FrameDepth {
     /// Index of the frame in the recording.
     pub frame: usize,
     /// Every corner with a measurement, by ascending id, those beyond [`MAX_ERROR_M`] included.
+    #[serde(skip)]
     pub samples: Vec<Sample>,
     /// Corners where the depth map has a hole, or that lie outside of it.
     pub n_holes: usize,
@@ -59,7 +61,7 @@ impl FrameDepth {
 }
 
 /// Depth against the board under one camera.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct BoardDepth {
     /// Frames with a depth map and a view of the board, in the order of the recording.
     pub frames: Vec<FrameDepth>,

@@ -22,7 +22,7 @@ pub struct CornerDepth {
 
 /// How many frames speak for a depth map that lies as the colour image does, and how many for one mirrored left for
 /// right.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Handedness {
     /// Frames that depth fits straight, and mirrored does not.
     pub n_straight: usize,

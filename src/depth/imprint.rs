@@ -21,7 +21,7 @@ use crate::{
 /// Structured light measures white paper a little nearer than black ink: by a tenth of a millimetre in the published
 /// recordings. The depth map so shows the chessboard, faintly, and where it shows it is where it lies, whatever the
 /// sensor's slow errors and the board's heights are.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Imprint {
     /// As in [`Registration`](super::Registration).
     pub zoom: Estimate,

@@ -8,7 +8,7 @@ use crate::{
 };
 
 /// Depth on the board after scale, bias, zoom and shift are taken out.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Pattern {
     /// Side of a cell of the map, pixels.
     pub cell_px: usize,
@@ -28,7 +28,7 @@ pub struct Pattern {
 }
 
 /// A cell of the map of residuals.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct PatternCell {
     /// Sensor minus model, metres: the median over the frames' medians. NaN where no frame showed the board.
     pub median_m: f64,
@@ -39,7 +39,7 @@ pub struct PatternCell {
 }
 
 /// How many pixels on the board have no measurement.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Holes {
     /// Pixels on the board.
     pub n_pixels: usize,

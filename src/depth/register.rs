@@ -32,7 +32,7 @@ use crate::{
 ///
 /// q is a pixel of the depth map, p the pixel of the colour image whose depth it holds, Z the depth of the board there
 /// and c the principal point. A true recording has scale 1, bias 0, zoom 1, shift 0.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Registration {
     /// 1 for a true sensor.
     pub scale: Estimate,
@@ -70,7 +70,7 @@ pub struct Registration {
 }
 
 /// Zoom and shift from how the depth of tilted views slopes.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Slopes {
     /// As in [`Registration`].
     pub zoom: Estimate,

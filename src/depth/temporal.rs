@@ -19,7 +19,7 @@ use crate::{
 /// Of a plane that moves a little, the *inverse* depths of two frames differ by a plane, exactly, whatever the camera;
 /// with that taken out, what both frames show alike drops out of their difference: the sensor's pattern, the print, the
 /// board's heights. No calibration enters.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct TemporalNoise {
     /// By distance, nearest first; empty where no two successive frames show the board standing still.
     pub by_range: Vec<NoiseAtRange>,
@@ -37,7 +37,7 @@ impl TemporalNoise {
 }
 
 /// Noise of single pixels at some distance.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct NoiseAtRange {
     /// Median distance of the pixels, metres.
     pub depth_m: f64,

@@ -44,29 +44,31 @@ pub use trace::Trace;
 use crate::{board::Layout, geom::Pixel};
 
 /// What was seen of a board in one image.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Observation {
     /// Corners, by ascending id. Empty where no board was identified.
     pub corners: Vec<Corner>,
     /// How the board was told from all others; `None` where it was not.
     pub identity: Option<Identity>,
     /// Candidates that were not taken, with the reason.
+    #[serde(rename = "rejected")]
     pub rejects: Vec<Reject>,
 }
 
 /// One inner corner of the board.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Corner {
     /// Id as [`CharucoBoard::corner`](crate::board::CharucoBoard::corner) counts.
     pub id: usize,
     /// Where it lies.
+    #[serde(flatten)]
     pub pixel: Pixel,
     /// Standard deviation of each coordinate, pixels.
     pub sigma_px: f64,
 }
 
 /// How the board was identified.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Identity {
     /// Which squares are white.
     pub layout: Layout,
@@ -76,23 +78,27 @@ pub struct Identity {
     pub inverted: bool,
     /// Ids of the markers whose bits voted, ascending. Markers of the board that are hidden, out of sight or too faint
     /// are not among them.
+    #[serde(rename = "marker_ids")]
     pub markers: Vec<usize>,
     /// Lead over the runner-up placement, as a log-likelihood ratio in nats.
+    #[serde(rename = "margin_nats")]
     pub margin: f64,
 }
 
 /// A candidate that was not taken.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Reject {
     /// Where.
+    #[serde(flatten)]
     pub pixel: Pixel,
     /// Why.
     pub reason: Reason,
 }
 
 /// Why a candidate was not taken.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
 #[non_exhaustive]
+#[serde(rename_all = "snake_case")]
 pub enum Reason {
     /// A lattice without anything like a marker in its squares.
     NoMarkers,

@@ -1,12 +1,9 @@
 //! What a diagnosis starts from, and the order of the checks.
 
 use super::{
-    Finding, Tolerances, td101_files, td102_dropped_frames, td103_metadata_incomplete,
-    td104_depth_unit, td105_depth_not_metric, td201_focal_length, td202_principal_point,
-    td203_not_rectified, td204_rectified_twice, td205_factory_changed, td301_depth_scale,
-    td302_depth_bias, td303_depth_noise, td401_zoom, td402_shift, td403_mirrored,
-    td501_distortion_centre, td502_reference_dimensions, td503_intrinsics_size,
-    td504_field_of_view,
+    Finding, Tolerances, findings,
+    td201_focal_length::{self, Measured},
+    td203_not_rectified,
 };
 use crate::{
     board::CharucoBoard,
@@ -126,32 +123,19 @@ impl Case<'_> {
     }
 }
 
+/// What several checks start from.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Known {
+    /// What was done to the colour images.
+    pub(super) state: StreamState,
+    /// The focal length that the recording speaks for.
+    pub(super) focal: Option<Measured>,
+}
+
 /// One finding per check, in order of their codes, and what they say about the stream's distortion.
 pub fn diagnose(case: &Case<'_>) -> (Vec<Finding>, StreamState) {
     let state = td203_not_rectified::state(case);
     // A focal length is comparable with the factory's only once the distortion is out of the way.
     let focal = td201_focal_length::measure(case, state);
-    let findings = vec![
-        td101_files::check(case),
-        td102_dropped_frames::check(case),
-        td103_metadata_incomplete::check(case),
-        td104_depth_unit::check(case),
-        td105_depth_not_metric::check(case),
-        td201_focal_length::check(case, focal.as_ref()),
-        td202_principal_point::check(case, state),
-        td203_not_rectified::check(case, state),
-        td204_rectified_twice::check(case, state),
-        td205_factory_changed::check(case),
-        td301_depth_scale::check(case, focal.as_ref()),
-        td302_depth_bias::check(case, focal.as_ref()),
-        td303_depth_noise::check(case),
-        td401_zoom::check(case, focal.as_ref()),
-        td402_shift::check(case, focal.as_ref()),
-        td403_mirrored::check(case),
-        td501_distortion_centre::check(case),
-        td502_reference_dimensions::check(case),
-        td503_intrinsics_size::check(case),
-        td504_field_of_view::check(case),
-    ];
-    (findings, state)
+    (findings(case, &Known { state, focal }), state)
 }

@@ -1,10 +1,15 @@
 //! What a finding says.
 
-use super::Code;
+use std::borrow::Cow;
+
+use serde::{Deserialize, Serialize};
+
+use super::{Basis, Check, Code, Tolerances};
 use crate::{calibrate::Estimate, recording::Defect};
 
 /// The judgement.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// Significant and relevant: the data are wrong.
     Fault,
@@ -55,21 +60,35 @@ impl Verdict {
 }
 
 /// What the value of a finding counts. Findings speak to people: lengths are millimetres here.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Unit {
     /// Percent.
+    #[serde(rename = "%")]
     Percent,
     /// Pixels.
+    #[serde(rename = "px")]
     Px,
     /// Millimetres.
+    #[serde(rename = "mm")]
     Mm,
     /// Degrees.
+    #[serde(rename = "deg")]
     Degrees,
     /// A number of things.
+    #[serde(rename = "")]
     Count,
 }
 
 impl Unit {
+    /// How much of the library's unit (a fraction, metres) one of it is.
+    pub const fn in_library(self) -> f64 {
+        match self {
+            Self::Percent => 0.01,
+            Self::Mm => 1e-3,
+            Self::Px | Self::Degrees | Self::Count => 1.0,
+        }
+    }
+
     /// `%`, `px`, `mm`, `deg` or nothing: stable, for machines and people.
     pub const fn symbol(self) -> &'static str {
         match self {
@@ -86,15 +105,133 @@ impl Unit {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Evidence {
     /// Stable name in the style of `factory_focal_px`; carries the unit.
-    pub name: &'static str,
+    pub name: Cow<'static, str>,
     /// The number.
     pub value: f64,
     /// Its standard deviation, where it is an estimate.
     pub sigma: Option<f64>,
 }
 
+impl Evidence {
+    pub(crate) const fn number(name: &'static str, value: f64) -> Self {
+        Self { name: Cow::Borrowed(name), value, sigma: None }
+    }
+
+    pub(crate) const fn estimate(name: &'static str, Estimate { value, sigma }: Estimate) -> Self {
+        Self { name: Cow::Borrowed(name), value, sigma: Some(sigma) }
+    }
+}
+
+/// Evidence as a map from its names.
+mod by_name {
+    use std::{borrow::Cow, collections::BTreeMap};
+
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    use super::Evidence;
+
+    #[derive(Serialize, Deserialize)]
+    struct Number {
+        value: Option<f64>,
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        sigma: Option<f64>,
+    }
+
+    pub(super) fn serialize<S: Serializer>(
+        all: &[Evidence],
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(
+            all.iter().map(|e| (&e.name, Number { value: Some(e.value), sigma: e.sigma })),
+        )
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(
+        from: D,
+    ) -> Result<Vec<Evidence>, D::Error> {
+        let map = BTreeMap::<String, Number>::deserialize(from)?;
+        let evidence = |(name, Number { value, sigma })| Evidence {
+            name: Cow::Owned(name),
+            value: Option::unwrap_or(value, f64::NAN),
+            sigma,
+        };
+        Ok(map.into_iter().map(evidence).collect())
+    }
+}
+
+/// A row of the table of quantities, as people read it. A cell without a number says `—`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Quantity {
+    /// What was measured.
+    pub name: String,
+    /// What it is according to the factory, or ought to be.
+    pub factory: String,
+    /// What it is.
+    pub measured: String,
+    /// Where this is not the value of the finding.
+    pub difference: Option<String>,
+}
+
+/// What to record to be able to tell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ToRecord {
+    /// Views from many sides, for the focal length.
+    ManySides,
+    /// Views turned in the image, for the principal point.
+    Turned,
+    /// Views that reach into the corners, for the distortion.
+    Corners,
+    /// Views at several distances, for the line of depth over distance.
+    Distances,
+    /// Tilted views, for the place of depth against colour.
+    Tilted,
+    /// Any views of the board with depth.
+    WithDepth,
+    /// Views without glare, for noise and holes.
+    Unhindered,
+    /// Any sharp view of the board.
+    Sharp,
+    /// Metadata.
+    Metadata,
+}
+
+impl ToRecord {
+    /// In a sentence.
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::ManySides => {
+                "Record 20 or more frames moving round the board, tilted by 20 to 45 degrees in different directions: \
+                 from fronto-parallel views alone focal length and distance cannot be told apart."
+            }
+            Self::Turned => {
+                "Record 20 or more frames with the board tilted by 20 to 45 degrees to all sides and turned in the \
+                 image by 90 degrees in some of them."
+            }
+            Self::Corners => {
+                "Record 20 or more frames with the board tilted by 20 to 45 degrees in different directions and \
+                 reaching into the corners of the image."
+            }
+            Self::Distances => {
+                "Record the board at several distances (0.2 m to 0.5 m), 20 or more frames, tilted in different \
+                 directions, so that the focal length can be measured, too."
+            }
+            Self::Tilted => {
+                "Record 20 or more frames with the board tilted by 20 to 45 degrees to all sides, at 0.2 m to 0.4 m: \
+                 depth that does not vary over the image looks the same wherever it lies."
+            }
+            Self::WithDepth => "Record the board at 0.2 m to 0.4 m with depth.",
+            Self::Unhindered => {
+                "Record the board at 0.2 m to 0.4 m, not too slantingly, without direct sunlight."
+            }
+            Self::Sharp => "Record frames that show the board sharp and from the front.",
+            Self::Metadata => "Record with an app that saves the intrinsics.",
+        }
+    }
+}
+
 /// One thing that was checked.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
     /// Which check.
     pub code: Code,
@@ -108,42 +245,82 @@ pub struct Finding {
     pub unit: Unit,
     /// Beyond this a significant deviation is a fault; `None` where the check knows no tolerance.
     pub tolerance: Option<f64>,
-    /// What was found, in one sentence with the numbers and the test that was applied.
-    pub summary: String,
+    /// What was found, in sentences with the numbers.
+    pub claim: String,
+    /// How it was tested, in a sentence; empty where the claim says it all.
+    pub test: String,
     /// The numbers behind it.
+    #[serde(with = "by_name")]
     pub evidence: Vec<Evidence>,
-    /// What the person should do now; with *unknown*, what to record to be able to tell. Empty where nothing is.
+    /// What the person should do now. Empty where nothing is.
     pub what_to_do: String,
+    /// With *unknown*: what to record to be able to tell, which `what_to_do` then says.
+    pub to_record: Option<ToRecord>,
     /// What is wrong, where it could be removed: of a fault, and of a deviation that is significant though within the
     /// tolerance (*info*), which is corrected only where that is asked for.
     pub defect: Option<Defect>,
-}
-
-impl Evidence {
-    pub(super) const fn number(name: &'static str, value: f64) -> Self {
-        Self { name, value, sigma: None }
-    }
-
-    pub(super) const fn estimate(name: &'static str, Estimate { value, sigma }: Estimate) -> Self {
-        Self { name, value, sigma: Some(sigma) }
-    }
+    /// What the finding rests on.
+    pub basis: Basis,
+    /// Its row of the table of quantities; `None` where there is no quantity to show.
+    #[serde(skip)]
+    pub quantity: Option<Quantity>,
 }
 
 impl Finding {
     /// Nothing known yet.
-    pub(crate) const fn new(code: Code, unit: Unit) -> Self {
+    pub(crate) fn new(code: Code, tolerances: &Tolerances) -> Self {
+        let Check { unit, basis, .. } = *code.check();
         Self {
             code,
             verdict: Verdict::Unknown,
             value: None,
             sigma: None,
             unit,
-            tolerance: None,
-            summary: String::new(),
+            tolerance: tolerances.shown(code),
+            claim: String::new(),
+            test: String::new(),
             evidence: Vec::new(),
             what_to_do: String::new(),
+            to_record: None,
             defect: None,
+            basis,
+            quantity: None,
         }
+    }
+
+    /// Nothing can be told: why, and what to record.
+    pub(super) fn unknown(mut self, claim: String, to_record: ToRecord) -> Self {
+        self.claim = claim;
+        self.record(to_record);
+        self
+    }
+
+    /// What to record to be able to tell.
+    pub(super) fn record(&mut self, to_record: ToRecord) {
+        to_record.words().clone_into(&mut self.what_to_do);
+        self.to_record = Some(to_record);
+    }
+
+    /// The row of a quantity that is called as the check is.
+    pub(super) fn show(&mut self, factory: impl Into<String>, measured: impl Into<String>) {
+        self.quantity = Some(Quantity {
+            name: self.title().to_owned(),
+            factory: factory.into(),
+            measured: measured.into(),
+            difference: None,
+        });
+    }
+
+    /// The deviation and its sigma, in the library's unit (a fraction, metres, pixels).
+    pub(super) fn measured(&mut self, deviation: Estimate) {
+        self.value = Some(deviation.value / self.unit.in_library());
+        self.sigma = Some(deviation.sigma / self.unit.in_library());
+    }
+
+    /// The tolerance in words, for the end of a test.
+    pub(super) fn tolerance_words(&self) -> String {
+        let tolerance = self.tolerance.unwrap_or(f64::NAN);
+        format!("tolerance {tolerance:.1} {}", self.unit.symbol())
     }
 
     /// Names the defect where there is one for sure: a fault, or a deviation that is significant though within the
@@ -158,42 +335,13 @@ impl Finding {
     pub fn title(&self) -> &'static str {
         self.code.title()
     }
-}
 
-/// What still counts as true.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tolerances {
-    /// Focal length against the factory's, fraction (0.01 = 1 %).
-    pub focal: f64,
-    /// Depth scale, fraction.
-    pub depth_scale: f64,
-    /// Depth bias, metres.
-    pub depth_bias_m: f64,
-    /// Residual lens distortion at the corner of the image, pixels.
-    pub distortion_px: f64,
-    /// Principal point against the factory's, along either axis, pixels.
-    pub principal_point_px: f64,
-    /// Zoom of depth against colour, fraction.
-    pub zoom: f64,
-    /// Shift of depth against colour, along either axis, pixels.
-    pub shift_px: f64,
-}
-
-impl Default for Tolerances {
-    /// 1 % for focal length and depth scale (at 0.3 m, 3 mm: the sensor's own noise), 3 mm for the bias for the same
-    /// reason, 1 px for distortion (a straight line is then still straight to the eye); 1 % for the zoom (3 px at the
-    /// image's edge) and 1 px for the shift: depth then belongs to its pixel or the next; 2 px for the principal
-    /// point, which calibrations determine worst and lenses move by a pixel when they focus.
-    fn default() -> Self {
-        Self {
-            focal: 0.01,
-            depth_scale: 0.01,
-            depth_bias_m: 0.003,
-            distortion_px: 1.0,
-            principal_point_px: 2.0,
-            zoom: 0.01,
-            shift_px: 1.0,
+    /// Claim and test.
+    pub fn summary(&self) -> String {
+        if self.test.is_empty() {
+            return self.claim.clone();
         }
+        format!("{} {}", self.claim, self.test)
     }
 }
 

@@ -1,12 +1,15 @@
 //! What the metadata alone tell: no board, no image.
 
 use super::{
-    Case, Code, Device, Evidence, Finding, Identity, KnownIssue, Registry, Sheet, Tolerances, Unit,
-    Verdict, td101_files, td102_dropped_frames, td103_metadata_incomplete, td205_factory_changed,
-    td501_distortion_centre, td502_reference_dimensions, td503_intrinsics_size,
-    td504_field_of_view,
+    Basis, Case, Code, Device, Evidence, Finding, Identity, Known, KnownIssue, Registry, Sheet,
+    Tolerances, Verdict, td101_files, td102_dropped_frames, td103_metadata_incomplete,
+    td205_factory_changed, td501_distortion_centre, td502_reference_dimensions,
+    td503_intrinsics_size, td504_field_of_view,
 };
-use crate::{board::CharucoBoard, recording::Recording};
+use crate::{
+    board::CharucoBoard,
+    recording::{Recording, StreamState},
+};
 
 /// What the metadata alone tell of a recording.
 #[derive(Clone, Debug)]
@@ -39,12 +42,13 @@ pub fn inspect<'a>(recording: &Recording, registry: &'a Registry) -> Inspection<
         t_ns: &t_ns,
         ..Case::unseen(&board, Tolerances::default())
     };
+    let known = Known { state: StreamState::Unknown, focal: None };
     let mut findings = vec![
-        td101_files::check(&case),
-        td102_dropped_frames::check(&case),
-        td103_metadata_incomplete::check(&case),
-        td205_factory_changed::check(&case),
-        td502_reference_dimensions::check(&case),
+        td101_files::check(&case, &known),
+        td102_dropped_frames::check(&case, &known),
+        td103_metadata_incomplete::check(&case, &known),
+        td205_factory_changed::check(&case, &known),
+        td502_reference_dimensions::check(&case, &known),
     ];
     findings.extend(identity.iter().flat_map(expected));
     let known_rectified = findings.iter().all(|f| f.code != Code::TD203);
@@ -54,9 +58,9 @@ pub fn inspect<'a>(recording: &Recording, registry: &'a Registry) -> Inspection<
         findings.push(correction_was_off());
     }
     findings.extend([
-        td501_distortion_centre::check(&case),
-        td503_intrinsics_size::check(&case),
-        td504_field_of_view::check(&case),
+        td501_distortion_centre::check(&case, &known),
+        td503_intrinsics_size::check(&case, &known),
+        td504_field_of_view::check(&case, &known),
     ]);
     findings.sort_by_key(|finding| finding.code);
     Inspection { device: Device::from_factory(factory), sheet, identity, findings }
@@ -68,15 +72,13 @@ fn expected(identity: &Identity<'_>) -> Vec<Finding> {
         .issues
         .iter()
         .map(|issue| {
-            let (code, unit) = match issue {
-                KnownIssue::DepthZoom => (Code::TD401, Unit::Percent),
-                KnownIssue::FocalLength => (Code::TD201, Unit::Percent),
-                KnownIssue::NotRectified => (Code::TD203, Unit::Px),
-            };
-            let mut finding = Finding::new(code, unit);
-            finding.verdict = Verdict::Warning;
+            let mut finding = expected_by_metadata(match issue {
+                KnownIssue::DepthZoom => Code::TD401,
+                KnownIssue::FocalLength => Code::TD201,
+                KnownIssue::NotRectified => Code::TD203,
+            });
             let rows: Vec<String> = identity.matches.iter().map(|e| e.name()).collect();
-            finding.summary = format!(
+            finding.claim = format!(
                 "Known of this camera ({}): {}. Not measured here.",
                 rows.join(", "),
                 issue.words()
@@ -94,10 +96,15 @@ fn expected(identity: &Identity<'_>) -> Vec<Finding> {
         .collect()
 }
 
+/// A warning that rests on metadata alone.
+fn expected_by_metadata(code: Code) -> Finding {
+    let finding = Finding::new(code, &Tolerances::default());
+    Finding { verdict: Verdict::Warning, basis: Basis::Metadata, ..finding }
+}
+
 fn correction_was_off() -> Finding {
-    let mut finding = Finding::new(Code::TD203, Unit::Px);
-    finding.verdict = Verdict::Warning;
-    finding.summary = "The file says that Apple's distortion correction was off \
+    let mut finding = expected_by_metadata(Code::TD203);
+    finding.claim = "The file says that Apple's distortion correction was off \
                        (GeometricDistortionCorrectionEnabled is false): expect images that are not rectified. Not \
                        measured here."
         .to_owned();

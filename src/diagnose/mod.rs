@@ -29,40 +29,47 @@ mod code;
 mod device;
 mod finding;
 mod inspect;
+pub(crate) mod numbers;
 mod pair;
 mod registry;
-
-mod td101_files;
-mod td102_dropped_frames;
-mod td103_metadata_incomplete;
-mod td104_depth_unit;
-mod td105_depth_not_metric;
-mod td201_focal_length;
-mod td202_principal_point;
-mod td203_not_rectified;
-mod td204_rectified_twice;
-mod td205_factory_changed;
-mod td301_depth_scale;
-mod td302_depth_bias;
-mod td303_depth_noise;
-mod td401_zoom;
-mod td402_shift;
-mod td403_mirrored;
-mod td501_distortion_centre;
-mod td502_reference_dimensions;
-mod td503_intrinsics_size;
-mod td504_field_of_view;
+mod tolerances;
 
 #[cfg(test)]
 mod tests;
 
+code::checks! {
+    TD101 td101_files;
+    TD102 td102_dropped_frames;
+    TD103 td103_metadata_incomplete;
+    TD104 td104_depth_unit;
+    TD105 td105_depth_not_metric;
+    TD201 td201_focal_length;
+    TD202 td202_principal_point;
+    TD203 td203_not_rectified;
+    TD204 td204_rectified_twice;
+    TD205 td205_factory_changed;
+    TD301 td301_depth_scale;
+    TD302 td302_depth_bias;
+    TD303 td303_depth_noise;
+    TD401 td401_zoom;
+    TD402 td402_shift;
+    TD403 td403_mirrored;
+    TD501 td501_distortion_centre;
+    TD502 td502_reference_dimensions;
+    TD503 td503_intrinsics_size;
+    TD504 td504_field_of_view;
+}
+
+use case::Known;
+
 pub use case::{Case, diagnose};
-pub use code::{Code, UnknownCode};
+pub use code::{Basis, Check, Tolerance, UnknownCode};
 pub use device::{Device, Sensor, depth_state};
-pub use finding::{Evidence, Finding, Tolerances, Unit, Verdict};
+pub use finding::{Evidence, Finding, Quantity, ToRecord, Unit, Verdict};
 pub use inspect::{Inspection, inspect};
 pub use pair::{AcrossApis, Comparison, SameApi, Side, compare, pairs};
 pub use registry::{
     Api, Certainty, Entry, Identity, KnownIssue, PaperFocal, Registry, RegistryError, Sheet,
     paper_focals,
 };
+pub use tolerances::{ToleranceError, Tolerances};

@@ -1,18 +1,21 @@
 #![doc = include_str!("td102_dropped_frames.md")]
 
-use super::{Case, Code, Evidence, Finding, Unit, Verdict};
+use super::{Basis, Case, Check, Code, Evidence, Finding, Known, Unit, Verdict};
 use crate::solve::median;
+
+pub(super) const CHECK: Check =
+    Check { title: "Dropped frames", unit: Unit::Count, basis: Basis::Metadata, tolerance: None };
 
 /// An interval longer than so many usual ones has lost a frame.
 const LONG: f64 = 1.5;
 
-pub(super) fn check(case: &Case<'_>) -> Finding {
-    let mut finding = Finding::new(Code::TD102, Unit::Count);
+pub(super) fn check(case: &Case<'_>, _: &Known) -> Finding {
+    let mut finding = Finding::new(Code::TD102, &case.tolerances);
     let intervals_s: Vec<f64> =
         case.t_ns.windows(2).map(|pair| 1e-9 * (pair[1] - pair[0]) as f64).collect();
     if intervals_s.len() < 3 {
         finding.verdict = Verdict::Info;
-        finding.summary =
+        finding.claim =
             format!("{} frames are too few to tell a rhythm, or a gap in it.", case.t_ns.len());
         return finding;
     }
@@ -30,13 +33,13 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
     ];
     if n_gaps == 0 {
         finding.verdict = Verdict::Ok;
-        finding.summary = format!(
+        finding.claim = format!(
             "{} frames follow each other every {usual_s:.3} s without a gap.",
             case.t_ns.len()
         );
     } else {
         finding.verdict = Verdict::Info;
-        finding.summary = format!(
+        finding.claim = format!(
             "Frames usually follow each other every {usual_s:.3} s; in {} {n_lost:.0} more would have \
              fitted.",
             if n_gaps == 1 { "one gap".to_owned() } else { format!("{n_gaps} gaps") }

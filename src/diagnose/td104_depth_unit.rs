@@ -1,19 +1,22 @@
 #![doc = include_str!("td104_depth_unit.md")]
 
-use super::{Case, Code, Evidence, Finding, Unit, Verdict};
+use super::{Basis, Case, Check, Code, Evidence, Finding, Known, ToRecord, Unit, Verdict};
 use crate::{
     math,
     recording::Defect,
     solve::{mad_sigma, median},
 };
 
+pub(super) const CHECK: Check =
+    Check { title: "Unit of depth", unit: Unit::Count, basis: Basis::Metadata, tolerance: None };
+
 /// Samples that make a median.
 const LEAST_SAMPLES: usize = 20;
 /// No focal length is wrong by so much; no unit differs from metres by less.
 const FAR_OFF: f64 = 3.0;
 
-pub(super) fn check(case: &Case<'_>) -> Finding {
-    let mut finding = Finding::new(Code::TD104, Unit::Count);
+pub(super) fn check(case: &Case<'_>, _: &Known) -> Finding {
+    let mut finding = Finding::new(Code::TD104, &case.tolerances);
     let depth = case.own_depth.or(case.factory_depth);
     let ratios: Vec<f64> = depth
         .iter()
@@ -23,10 +26,8 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
         .filter(|ln| ln.is_finite())
         .collect();
     if ratios.len() < LEAST_SAMPLES {
-        finding.summary =
-            "Cannot tell the unit of depth: it was hardly measured on the board.".to_owned();
-        finding.what_to_do = "Record the board at 0.2 m to 0.4 m with depth.".to_owned();
-        return finding;
+        let claim = "Cannot tell the unit of depth: it was hardly measured on the board.";
+        return finding.unknown(claim.to_owned(), ToRecord::WithDepth);
     }
     let middle = median(&ratios);
     let ratio = math::exp(middle);
@@ -38,7 +39,7 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
     ];
     if ratio < FAR_OFF && ratio > FAR_OFF.recip() {
         finding.verdict = Verdict::Ok;
-        finding.summary = format!(
+        finding.claim = format!(
             "Depth is in metres: on the board the sensor says {ratio:.3} times the board's depth."
         );
         return finding;
@@ -46,9 +47,11 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
     finding.verdict = Verdict::Fault;
     let power = math::log10(ratio).round();
     let unit = math::pow(10f64, power);
-    finding.summary = format!(
-        "Depth is in the wrong unit: on the board the sensor says {ratio:.3} times the board's depth (median of {} \
-         samples; no camera is wrong by a factor of {FAR_OFF:.0}).",
+    finding.claim = format!(
+        "Depth is in the wrong unit: on the board the sensor says {ratio:.3} times the board's depth."
+    );
+    finding.test = format!(
+        "Median of {} samples; no camera is wrong by a factor of {FAR_OFF:.0}.",
         ratios.len()
     );
     finding.what_to_do = if power == 0.0 {

@@ -1,7 +1,16 @@
 #![doc = include_str!("td105_depth_not_metric.md")]
 
-use super::{Case, Code, Evidence, Finding, Unit, Verdict};
+use super::{
+    Basis, Case, Check, Code, Evidence, Finding, Known, ToRecord, Tolerance, Unit, Verdict,
+};
 use crate::solve::median;
+
+pub(super) const CHECK: Check = Check {
+    title: "Depth metric",
+    unit: Unit::Percent,
+    basis: Basis::Metadata,
+    tolerance: Tolerance::fixed(100.0 * COARSE_SHARE),
+};
 
 /// Steps as coarse as this share of the depth hide the sensor's noise.
 const COARSE_SHARE: f64 = 0.003;
@@ -10,14 +19,11 @@ const LEVELS_8_BIT: usize = 256;
 /// Relative spread of the board's depth in a frame that tells which way depth runs.
 const LEAST_SPREAD: f64 = 0.1;
 
-pub(super) fn check(case: &Case<'_>) -> Finding {
-    let mut finding = Finding::new(Code::TD105, Unit::Percent);
-    finding.tolerance = Some(100.0 * COARSE_SHARE);
+pub(super) fn check(case: &Case<'_>, _: &Known) -> Finding {
+    let mut finding = Finding::new(Code::TD105, &case.tolerances);
     if case.steps.is_empty() {
-        finding.summary =
-            "Cannot tell whether depth is metric: no frame has depth on the board.".to_owned();
-        finding.what_to_do = "Record the board at 0.2 m to 0.4 m with depth.".to_owned();
-        return finding;
+        let claim = "Cannot tell whether depth is metric: no frame has depth on the board.";
+        return finding.unknown(claim.to_owned(), ToRecord::WithDepth);
     }
     let share = median(&case.steps.iter().map(|s| s.step_share).collect::<Vec<_>>());
     let levels = case.steps.iter().map(|s| s.n_levels).max().unwrap_or(0);
@@ -31,7 +37,7 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
     ];
     let coarse = share > COARSE_SHARE && levels <= LEVELS_8_BIT;
     let relative = case.factory.and_then(|f| f.depth_absolute) == Some(false);
-    let (verdict, summary, what_to_do) = if n_against >= 3 && n_against > 4 * n_with {
+    let (verdict, claim, what_to_do) = if n_against >= 3 && n_against > 4 * n_with {
         (
             Verdict::Fault,
             format!(
@@ -69,7 +75,7 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
         )
     };
     finding.verdict = verdict;
-    finding.summary = summary;
+    finding.claim = claim;
     what_to_do.clone_into(&mut finding.what_to_do);
     finding
 }

@@ -1,10 +1,21 @@
 #![doc = include_str!("td201_focal_length.md")]
 
-use super::{Case, Code, Evidence, Finding, Unit, Verdict, td503_intrinsics_size};
+use super::{
+    Basis, Case, Check, Code, Evidence, Finding, Known, ToRecord, Tolerance, Unit, Verdict,
+    numbers::{plain, signed, value_and_sigma},
+    td503_intrinsics_size,
+};
 use crate::{
     calibrate::{Estimate, KnownCamera, Lens},
     camera::Distortion,
     recording::{Defect, StreamState},
+};
+
+pub(super) const CHECK: Check = Check {
+    title: "Focal length",
+    unit: Unit::Percent,
+    basis: Basis::Views,
+    tolerance: Tolerance::named("focal", 1.0),
 };
 
 /// The focal length that this recording speaks for, with everything that makes it unsure.
@@ -105,41 +116,44 @@ pub(super) fn measure(case: &Case<'_>, state: StreamState) -> Option<Measured> {
     })
 }
 
-pub(super) fn check(case: &Case<'_>, measured: Option<&Measured>) -> Finding {
-    let mut finding = Finding::new(Code::TD201, Unit::Percent);
-    finding.tolerance = Some(100.0 * case.tolerances.focal);
-    let record = "Record 20 or more frames moving round the board, tilted by 20 to 45 degrees in different directions: \
-                  from fronto-parallel views alone focal length and distance cannot be told apart.";
+pub(super) fn check(case: &Case<'_>, known: &Known) -> Finding {
+    let mut finding = Finding::new(Code::TD201, &case.tolerances);
     let factory_px = case.factory.map(|f| f.intrinsics.focal_px());
-    if let Some(why) = case.poor_fit() {
-        finding.summary =
-            format!("Cannot tell whether the factory's focal length is right: {why}.");
-        record.clone_into(&mut finding.what_to_do);
-        return finding;
-    }
-    let (Some(measured), Some(factory_px)) = (measured, factory_px) else {
-        finding.summary = if factory_px.is_none() {
-            "Cannot tell whether the factory's focal length is right: the recording has no factory intrinsics."
-                .to_owned()
-        } else {
-            format!(
-                "Cannot tell whether the factory's focal length is right: {}.",
-                case.why_no_camera()
-            )
-        };
-        record.clone_into(&mut finding.what_to_do);
-        return finding;
+    let cell = |px: Option<String>| px.map_or_else(|| "—".to_owned(), |px| format!("{px} px"));
+    let factory_cell = cell(factory_px.map(|px| plain(px, 2)));
+    let why = match (case.poor_fit(), factory_px) {
+        (Some(why), _) => Some(why),
+        (None, None) => Some("the recording has no factory intrinsics".to_owned()),
+        (None, Some(_)) => known.focal.is_none().then(|| case.why_no_camera()),
+    };
+    let (Some(measured), Some(factory_px), None) = (&known.focal, factory_px, &why) else {
+        // As it was calibrated or given, if not judged.
+        let sigma_px = case.calibration.and_then(|c| c.parameter("focal_px")).map(|f| f.sigma);
+        let own = case.camera.map(|camera| Estimate {
+            value: camera.intrinsics.focal_px(),
+            sigma: sigma_px.unwrap_or(f64::NAN),
+        });
+        finding.show(factory_cell, cell(own.map(|own| value_and_sigma(own, 2))));
+        let why = why.unwrap_or_default();
+        let claim = format!("Cannot tell whether the factory's focal length is right: {why}.");
+        return finding.unknown(claim, ToRecord::ManySides);
     };
     let Estimate { value: focal_px, sigma: sigma_px } = measured.focal_px;
     let difference = Estimate { value: focal_px / factory_px - 1.0, sigma: sigma_px / factory_px };
-    finding.verdict = Verdict::of(difference, case.tolerances.focal);
-    let (percent, percent_sigma) = (100.0 * difference.value, 100.0 * difference.sigma);
-    finding.value = Some(percent);
+    finding.verdict = Verdict::of(difference, case.tolerances.of(finding.code));
+    finding.measured(difference);
+    let percent = 100.0 * difference.value;
     let is_exact = measured.origin == Origin::Given && measured.formal_sigma_px.is_none();
-    finding.sigma = (!is_exact).then_some(percent_sigma);
+    finding.sigma = finding.sigma.filter(|_| !is_exact);
+    let percent_sigma = finding.sigma.unwrap_or(f64::NAN);
+    let shown = Estimate { sigma: if is_exact { f64::NAN } else { sigma_px }, ..measured.focal_px };
+    finding.show(factory_cell, cell(Some(value_and_sigma(shown, 2))));
     finding.evidence = vec![
         Evidence::number("factory_focal_px", factory_px),
-        Evidence { name: "focal_px", value: focal_px, sigma: finding.sigma.map(|_| sigma_px) },
+        Evidence {
+            sigma: finding.sigma.map(|_| sigma_px),
+            ..Evidence::number("focal_px", focal_px)
+        },
     ];
     for (name, value) in [
         ("sigma_of_fit_px", measured.formal_sigma_px),
@@ -150,20 +164,20 @@ pub(super) fn check(case: &Case<'_>, measured: Option<&Measured>) -> Finding {
         finding.evidence.extend(value.map(|value| Evidence::number(name, value)));
     }
     let how = match measured.origin {
-        Origin::Given if is_exact => "given from outside and taken as exact".to_owned(),
-        Origin::Given => format!("given from outside, sigma {}", measured.sigmas()),
+        Origin::Given if is_exact => "Given from outside and taken as exact".to_owned(),
+        Origin::Given => format!("Given from outside, σ {}", measured.sigmas()),
         Origin::Own => {
             let without = measured.left_out_px.map_or(String::new(), |[low, high]| {
                 format!("; without any one picture {low:.2} to {high:.2} px")
             });
-            format!("measured against the board, sigma {}{without}", measured.sigmas())
+            format!("Measured against the board, σ {}{without}", measured.sigmas())
         }
         Origin::DistortionTakenOut => {
             finding
                 .evidence
                 .push(Evidence::number("focal_with_distortion_left_in_px", measured.own_px));
             format!(
-                "measured with the stream's distortion taken out ({:.2} px with it left in), sigma {}",
+                "Measured with the stream's distortion taken out ({:.2} px with it left in), σ {}",
                 measured.own_px,
                 measured.sigmas()
             )
@@ -174,9 +188,9 @@ pub(super) fn check(case: &Case<'_>, measured: Option<&Measured>) -> Finding {
     let (decimals, spread) = if is_exact {
         (2, String::new())
     } else if percent_sigma < 5e-4 {
-        (decimals, " +- less than 0.001".to_owned())
+        (decimals, " ± less than 0.001".to_owned())
     } else {
-        (decimals, format!(" +- {percent_sigma:.decimals$}"))
+        (decimals, format!(" ± {percent_sigma:.decimals$}"))
     };
     let words = match finding.verdict {
         Verdict::Fault => "The factory's focal length is wrong",
@@ -186,11 +200,11 @@ pub(super) fn check(case: &Case<'_>, measured: Option<&Measured>) -> Finding {
             "Cannot tell whether the factory's focal length is right"
         }
     };
-    finding.summary = format!(
-        "{words}: {focal_px:.2} px instead of {factory_px:.2} px, {percent:+.decimals$}{spread} % ({how}; \
-         tolerance {:.1} %).",
-        100.0 * case.tolerances.focal
+    finding.claim = format!(
+        "{words}: {focal_px:.2} px instead of {factory_px:.2} px, {}{spread} %.",
+        signed(percent, decimals)
     );
+    finding.test = format!("{how}; {}.", finding.tolerance_words());
     match finding.verdict {
         Verdict::Fault => {
             finding.what_to_do = format!(
@@ -201,7 +215,7 @@ pub(super) fn check(case: &Case<'_>, measured: Option<&Measured>) -> Finding {
                 if difference.value < 0.0 { "too far" } else { "too near" },
             );
         }
-        Verdict::Unknown | Verdict::Warning => record.clone_into(&mut finding.what_to_do),
+        Verdict::Unknown | Verdict::Warning => finding.record(ToRecord::ManySides),
         Verdict::Info | Verdict::Ok => {}
     }
     let scaled_px = td503_intrinsics_size::scaled(case).map_or(factory_px, |k| k.focal_px());

@@ -1,11 +1,21 @@
 #![doc = include_str!("td202_principal_point.md")]
 
-use super::{Case, Code, Evidence, Finding, Unit, Verdict, td503_intrinsics_size};
+use super::{
+    Basis, Case, Check, Code, Evidence, Finding, Known, ToRecord, Tolerance, Unit, Verdict,
+    numbers::plain, td503_intrinsics_size,
+};
 use crate::{
     calibrate::{Estimate, Lens},
     camera::Intrinsics,
     math,
     recording::{Defect, StreamState},
+};
+
+pub(super) const CHECK: Check = Check {
+    title: "Principal point",
+    unit: Unit::Px,
+    basis: Basis::Views,
+    tolerance: Tolerance::named("principal-point", 2.0),
 };
 
 /// The principal point, free, under what is in the stream.
@@ -34,13 +44,15 @@ fn expected(case: &Case<'_>, own: [Estimate; 2]) -> Option<([f64; 2], bool)> {
     }
 }
 
-pub(super) fn check(case: &Case<'_>, state: StreamState) -> Finding {
-    let mut finding = Finding::new(Code::TD202, Unit::Px);
-    let tolerance_px = case.tolerances.principal_point_px;
-    finding.tolerance = Some(tolerance_px);
-    let record = "Record 20 or more frames with the board tilted by 20 to 45 degrees to all sides and turned in the \
-                  image by 90 degrees in some of them.";
-    let measured = measured(case, state).filter(|_| case.poor_fit().is_none());
+pub(super) fn check(case: &Case<'_>, known: &Known) -> Finding {
+    let mut finding = Finding::new(Code::TD202, &case.tolerances);
+    let tolerance_px = case.tolerances.of(finding.code);
+    let cell = |place: Option<[f64; 2]>| match place {
+        Some([x, y]) => format!("{}, {} px", plain(x, 2), plain(y, 2)),
+        None => "—".to_owned(),
+    };
+    let factory_cell = cell(case.factory.map(|f| [f.intrinsics.cx, f.intrinsics.cy]));
+    let measured = measured(case, known.state).filter(|_| case.poor_fit().is_none());
     let expected = measured.and_then(|own| expected(case, own));
     let (Some(own), Some((factory, is_mirrored))) = (measured, expected) else {
         let why = match case.poor_fit() {
@@ -49,10 +61,9 @@ pub(super) fn check(case: &Case<'_>, state: StreamState) -> Finding {
             None if case.camera.is_some() => "the distortion of the stream is not known".to_owned(),
             None => case.why_no_camera(),
         };
-        finding.summary =
-            format!("Cannot tell whether the factory's principal point is right: {why}.");
-        record.clone_into(&mut finding.what_to_do);
-        return finding;
+        finding.show(factory_cell, cell(None));
+        let claim = format!("Cannot tell whether the factory's principal point is right: {why}.");
+        return finding.unknown(claim, ToRecord::Turned);
     };
     let off = [0, 1].map(|i| Estimate { value: own[i].value - factory[i], sigma: own[i].sigma });
     // The worse of both axes: a fault in one is a fault, and ok must mean both.
@@ -62,6 +73,7 @@ pub(super) fn check(case: &Case<'_>, state: StreamState) -> Finding {
     // Along its own direction, both axes taken as independent.
     let share = |i: usize| if length_px > 0.0 { off[i].value / length_px } else { 0.5f64.sqrt() };
     finding.sigma = Some(math::hypot(share(0) * off[0].sigma, share(1) * off[1].sigma));
+    finding.show(factory_cell, cell(Some([own[0].value, own[1].value])));
     finding.evidence = vec![
         Evidence::estimate("center_x_px", own[0]),
         Evidence::estimate("center_y_px", own[1]),
@@ -78,13 +90,13 @@ pub(super) fn check(case: &Case<'_>, state: StreamState) -> Finding {
             "Cannot tell whether the factory's principal point is right"
         }
     };
-    finding.summary = format!(
-        "{words}: ({:.2} +- {:.2}, {:.2} +- {:.2}) px instead of ({:.2}, {:.2}) px (either axis judged by itself; \
-         tolerance {tolerance_px:.1} px).",
+    finding.claim = format!(
+        "{words}: ({:.2} ± {:.2}, {:.2} ± {:.2}) px instead of ({:.2}, {:.2}) px.",
         own[0].value, own[0].sigma, own[1].value, own[1].sigma, factory[0], factory[1],
     );
+    finding.test = format!("Either axis judged by itself; {}.", finding.tolerance_words());
     if is_mirrored {
-        finding.summary += " The images are mirrored, and so the factory's is taken mirrored, too.";
+        finding.claim += " The images are mirrored, and so the factory's is taken mirrored, too.";
     }
     match finding.verdict {
         Verdict::Fault => {
@@ -92,7 +104,7 @@ pub(super) fn check(case: &Case<'_>, state: StreamState) -> Finding {
                 "Use the measured principal point together with the measured focal length."
                     .to_owned();
         }
-        Verdict::Unknown | Verdict::Warning => record.clone_into(&mut finding.what_to_do),
+        Verdict::Unknown | Verdict::Warning => finding.record(ToRecord::Turned),
         Verdict::Info | Verdict::Ok => {}
     }
     if let Some(k) = td503_intrinsics_size::scaled(case) {

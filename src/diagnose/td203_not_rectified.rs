@@ -1,14 +1,21 @@
 #![doc = include_str!("td203_not_rectified.md")]
 
-use super::{Case, Code, Evidence, Finding, Unit, Verdict, depth_state};
+use super::{
+    Basis, Case, Check, Code, Evidence, Finding, Known, ToRecord, Tolerance, Unit, Verdict,
+    depth_state,
+    numbers::{plain, signed},
+};
 use crate::{
     calibrate::{DistortionTest, Estimate, Lens},
     recording::{Defect, StreamState},
 };
 
-/// What to record to be able to tell.
-pub(super) const RECORD: &str = "Record 20 or more frames with the board tilted by 20 to 45 degrees in different \
-                                 directions and reaching into the corners of the image.";
+pub(super) const CHECK: Check = Check {
+    title: "Lens distortion in the images",
+    unit: Unit::Px,
+    basis: Basis::Views,
+    tolerance: Tolerance::named("distortion", 1.0),
+};
 
 /// A table is in the stream, is not, or was applied twice: halfway to the next of these it stops being one.
 const HALFWAY: f64 = 0.5;
@@ -18,7 +25,7 @@ pub(super) fn state(case: &Case<'_>) -> StreamState {
     let Some(test) = case.distortion.filter(|_| case.poor_fit().is_none()) else {
         return StreamState::Unknown;
     };
-    let tolerance_px = case.tolerances.distortion_px;
+    let tolerance_px = case.tolerances.of(Code::TD203);
     match test.amplitude {
         Some(Estimate { value, sigma }) => {
             let reach = 3.0 * sigma;
@@ -87,20 +94,21 @@ pub(super) fn numbers(test: &DistortionTest) -> String {
     let rms = |lens| rms_px(test, lens).unwrap_or(f64::NAN);
     match test.amplitude {
         Some(amount) => format!(
-            "{:.0} % +- {:.0} % of the distortion in Apple's table is in the images, {value:+.2} +- {sigma:.2} px at \
-             the image's corner; residuals are {:.2} px taken as rectified, {:.2} px with the inverse table and {:.2} \
-             px with the forward table",
-            (100.0 * amount.value).round() + 0.0, // no "-0"
+            "{} % ± {:.0} % of the distortion in Apple's table is in the images, {} ± {sigma:.2} px at the image's \
+             corner; residuals are {:.2} px taken as rectified, {:.2} px with the inverse table and {:.2} px with the \
+             forward table",
+            plain(100.0 * amount.value, 0),
             100.0 * amount.sigma,
+            signed(value, 2),
             rms(Lens::None),
             rms(Lens::InverseTable),
             rms(Lens::ForwardTable),
         ),
         None => format!(
-            "the corners ask for a lens distortion of {value:+.2} +- {sigma:.2} px at the image's corner (k1 = {:+.3} \
-             +- {:.3}); residuals are {:.2} px without and {:.2} px with it. The recording has no table to \
-             compare with",
-            test.k1.value,
+            "the corners ask for a lens distortion of {} ± {sigma:.2} px at the image's corner (k1 = {} ± {:.3}); \
+             residuals are {:.2} px without and {:.2} px with it. The recording has no table to compare with",
+            signed(value, 2),
+            signed(test.k1.value, 3),
             test.k1.sigma,
             rms(Lens::None),
             rms(Lens::FreeRadial),
@@ -117,8 +125,8 @@ fn of_depth(state: StreamState, depth: StreamState, share: Option<Estimate>) -> 
         _ => "Depth is not as colour is",
     };
     format!(
-        " {how} (0 % is colour's state, 100 % the other one: {:.0} % +- {:.0} %).",
-        (100.0 * value).round() + 0.0, // no "-0"
+        " {how} (0 % is colour's state, 100 % the other one: {} % ± {:.0} %).",
+        plain(100.0 * value, 0),
         100.0 * sigma
     )
 }
@@ -131,20 +139,26 @@ pub(super) fn why_unknown(case: &Case<'_>) -> String {
     })
 }
 
-pub(super) fn check(case: &Case<'_>, state: StreamState) -> Finding {
-    let mut finding = Finding::new(Code::TD203, Unit::Px);
-    finding.tolerance = Some(case.tolerances.distortion_px);
+pub(super) fn check(case: &Case<'_>, known: &Known) -> Finding {
+    let mut finding = Finding::new(Code::TD203, &case.tolerances);
+    let state = known.state;
+    let share = case.registration.and_then(|r| r.lens_share);
+    let depth = depth_state(state, share);
+    let of_depth_too = match depth {
+        StreamState::Unknown => String::new(),
+        same if same == state => ", depth too".to_owned(),
+        other => format!(", depth {}", other.name()),
+    };
+    finding.show("—", state.name().replace('_', " ") + &of_depth_too);
     let (claim, contradicted) = claim(case, state);
     let Some(test) = case.distortion.filter(|_| case.poor_fit().is_none()) else {
-        finding.summary =
+        let claim =
             format!("Cannot tell whether the stream is rectified: {}.{claim}", why_unknown(case));
-        RECORD.clone_into(&mut finding.what_to_do);
-        return finding;
+        return finding.unknown(claim, ToRecord::Corners);
     };
     let shift = test.corner_shift_px;
-    let by_size = Verdict::of(shift, case.tolerances.distortion_px);
-    finding.value = Some(shift.value);
-    finding.sigma = Some(shift.sigma);
+    let by_size = Verdict::of(shift, case.tolerances.of(Code::TD203));
+    finding.measured(shift);
     finding.evidence = evidence(test);
     let (verdict, words, remainder) = match state {
         // A table of less than the tolerance harms nobody.
@@ -173,10 +187,8 @@ pub(super) fn check(case: &Case<'_>, state: StreamState) -> Finding {
         }
     };
     finding.verdict = verdict;
-    let share = case.registration.and_then(|r| r.lens_share);
     finding.evidence.extend(share.map(|s| Evidence::estimate("depth_share_of_other_state", s)));
-    let depth = depth_state(state, share);
-    finding.summary =
+    finding.claim =
         format!("{words}: {}{remainder}.{claim}{}", numbers(test), of_depth(state, depth, share));
     if depth != StreamState::Unknown && depth != state {
         finding.verdict = Verdict::Warning;
@@ -206,7 +218,7 @@ pub(super) fn check(case: &Case<'_>, state: StreamState) -> Finding {
                 "Nothing; do not apply the lookup tables to this stream.".to_owned();
         }
         StreamState::Rectified | StreamState::RectifiedTwice => {}
-        StreamState::Unknown => RECORD.clone_into(&mut finding.what_to_do),
+        StreamState::Unknown => finding.record(ToRecord::Corners),
     }
     finding
 }

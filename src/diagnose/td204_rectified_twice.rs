@@ -1,19 +1,24 @@
 #![doc = include_str!("td204_rectified_twice.md")]
 
 use super::{
-    Case, Code, Finding, Unit, Verdict,
-    td203_not_rectified::{RECORD, evidence, numbers, why_unknown},
+    Basis, Case, Check, Code, Finding, Known, ToRecord, Unit, Verdict,
+    td203_not_rectified::{self, evidence, numbers, why_unknown},
 };
 use crate::recording::{Defect, StreamState};
 
-pub(super) fn check(case: &Case<'_>, state: StreamState) -> Finding {
-    let mut finding = Finding::new(Code::TD204, Unit::Px);
-    finding.tolerance = Some(case.tolerances.distortion_px);
+pub(super) const CHECK: Check = Check {
+    title: "Rectified twice",
+    unit: Unit::Px,
+    basis: Basis::Views,
+    tolerance: td203_not_rectified::CHECK.tolerance,
+};
+
+pub(super) fn check(case: &Case<'_>, known: &Known) -> Finding {
+    let mut finding = Finding::new(Code::TD204, &case.tolerances);
     let Some(test) = case.distortion.filter(|_| case.poor_fit().is_none()) else {
-        finding.summary =
+        let claim =
             format!("Cannot tell whether the stream was rectified twice: {}.", why_unknown(case));
-        RECORD.clone_into(&mut finding.what_to_do);
-        return finding;
+        return finding.unknown(claim, ToRecord::Corners);
     };
     // What was taken out too much bends against the lens.
     let [value, sigma] = [-test.corner_shift_px.value, test.corner_shift_px.sigma];
@@ -21,7 +26,7 @@ pub(super) fn check(case: &Case<'_>, state: StreamState) -> Finding {
     finding.value = Some(value * against);
     finding.sigma = Some(sigma);
     finding.evidence = evidence(test);
-    let words = match state {
+    let words = match known.state {
         StreamState::RectifiedTwice => {
             finding.verdict = Verdict::Fault;
             finding.defect = Some(Defect::RectifiedTwice);
@@ -35,10 +40,10 @@ pub(super) fn check(case: &Case<'_>, state: StreamState) -> Finding {
             "The stream was not rectified twice"
         }
         StreamState::Unknown => {
-            RECORD.clone_into(&mut finding.what_to_do);
+            finding.record(ToRecord::Corners);
             "Cannot tell whether the stream was rectified twice"
         }
     };
-    finding.summary = format!("{words}: {}.", numbers(test));
+    finding.claim = format!("{words}: {}.", numbers(test));
     finding
 }

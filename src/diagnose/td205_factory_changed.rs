@@ -1,7 +1,17 @@
 #![doc = include_str!("td205_factory_changed.md")]
 
-use super::{Case, Code, Evidence, Finding, SameApi, Side, Unit, Verdict};
+use super::{
+    Basis, Case, Check, Code, Evidence, Finding, Known, SameApi, Side, ToRecord, Tolerances, Unit,
+    Verdict, numbers::signed,
+};
 use crate::recording::Problem;
+
+pub(super) const CHECK: Check = Check {
+    title: "Factory calibration changed",
+    unit: Unit::Percent,
+    basis: Basis::Metadata,
+    tolerance: None,
+};
 
 /// Factory numbers are printed to six digits and more; what differs by less is rounding.
 const SAME_PERCENT: f64 = 1e-3;
@@ -9,21 +19,20 @@ const SAME_PERCENT: f64 = 1e-3;
 const LARGE_PERCENT: f64 = 1.0;
 
 /// Within one recording: whether the metadata stay the same from frame to frame.
-pub(super) fn check(case: &Case<'_>) -> Finding {
-    let mut finding = Finding::new(Code::TD205, Unit::Percent);
+pub(super) fn check(case: &Case<'_>, _: &Known) -> Finding {
+    let mut finding = Finding::new(Code::TD205, &case.tolerances);
     let vary = case.problems.iter().find_map(|problem| match problem {
         Problem::IntrinsicsVary { fx_px, cx_px, cy_px } => Some((fx_px, cx_px, cy_px)),
         _ => None,
     });
     if case.factory.is_none() {
-        finding.summary = "The recording has no factory intrinsics to compare.".to_owned();
-        finding.what_to_do = "Record with an app that saves the metadata.".to_owned();
-        return finding;
+        let claim = "The recording has no factory intrinsics to compare.".to_owned();
+        return finding.unknown(claim, ToRecord::Metadata);
     }
     let Some((fx, cx, cy)) = vary else {
         finding.verdict = Verdict::Ok;
         finding.value = Some(0.0);
-        finding.summary =
+        finding.claim =
             "The factory calibration is the same in all frames. `truedepth compare` compares \
                            recordings with each other."
                 .to_owned();
@@ -42,7 +51,7 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
 
 /// Between two recordings of one device under one API.
 pub(super) fn between(first: &Side, second: &Side, same: &SameApi) -> Finding {
-    let mut finding = Finding::new(Code::TD205, Unit::Percent);
+    let mut finding = Finding::new(Code::TD205, &Tolerances::default());
     let percent = 100.0 * same.focal_difference;
     finding.value = Some(percent);
     finding.evidence = vec![
@@ -54,20 +63,24 @@ pub(super) fn between(first: &Side, second: &Side, same: &SameApi) -> Finding {
     if !same.same_unit {
         finding.verdict = Verdict::Unknown;
         let [x, y] = same.center_shift_px;
-        finding.summary = format!(
+        finding.claim = format!(
             "The two are not of one device, or its whole calibration was made anew: the principal points lie \
-             ({x:+.2}, {y:+.2}) px apart at the reference dimensions."
+             ({}, {}) px apart at the reference dimensions.",
+            signed(x, 2),
+            signed(y, 2)
         );
         finding.what_to_do = "Compare recordings of one device.".to_owned();
     } else if same.focal_difference.abs() <= SAME_PERCENT / 100.0 {
         finding.verdict = Verdict::Ok;
-        finding.summary = "The factory calibration is the same in both.".to_owned();
+        finding.claim = "The factory calibration is the same in both.".to_owned();
     } else {
         finding.verdict = Verdict::Warning;
-        finding.summary = format!(
+        finding.claim = format!(
             "The factory calibration of one device has changed: focal length {:.2} px, then {:.2} px at the reference \
-             dimensions ({percent:+.3} %), with principal point and distortion centre as before.",
-            first.sheet.focal_px, second.sheet.focal_px
+             dimensions ({} %), with principal point and distortion centre as before.",
+            first.sheet.focal_px,
+            second.sheet.focal_px,
+            signed(percent, 3)
         );
         finding.what_to_do = "Keep the metadata with each recording and use its own: the paper saw such a change with \
                               an update of the system, and an iPhone shows one from recording to recording. It is no \
@@ -80,7 +93,7 @@ pub(super) fn between(first: &Side, second: &Side, same: &SameApi) -> Finding {
 fn judge(finding: &mut Finding, percent: f64, when: &str) {
     let large = percent.abs() > LARGE_PERCENT;
     finding.verdict = if large { Verdict::Warning } else { Verdict::Info };
-    finding.summary = format!(
+    finding.claim = format!(
         "The factory calibration changes {when}: the focal length by {:.3} %.",
         percent.abs()
     );

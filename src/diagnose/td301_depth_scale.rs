@@ -1,11 +1,18 @@
 #![doc = include_str!("td301_depth_scale.md")]
 
-use super::{Case, Code, Evidence, Finding, Unit, Verdict, td201_focal_length::Measured};
+use super::{
+    Basis, Case, Check, Code, Evidence, Finding, Known, ToRecord, Tolerance, Unit, Verdict,
+    numbers::{signed, value_and_sigma},
+    td201_focal_length::Measured,
+};
 use crate::{calibrate::Estimate, depth::Registration, math, recording::Defect};
 
-/// What to record for a line of depth over distance.
-pub(super) const RECORD: &str = "Record the board at several distances (0.2 m to 0.5 m), 20 or more frames, tilted in \
-                                 different directions, so that the focal length can be measured, too.";
+pub(super) const CHECK: Check = Check {
+    title: "Depth scale",
+    unit: Unit::Percent,
+    basis: Basis::Depth,
+    tolerance: Tolerance::named("depth-scale", 1.0),
+};
 
 /// What the registration says once the focal length's whole uncertainty is in it: the board's depth is proportional to
 /// the focal length, so that its relative sigma is one of the scale and of every offset, but none of the bias.
@@ -55,12 +62,12 @@ impl Scaled {
 /// The registration and the focal length, where both are fit to judge the sensor by; otherwise why not.
 pub(super) fn basis<'a>(
     case: &Case<'a>,
-    focal: Option<&'a Measured>,
+    known: &'a Known,
 ) -> Result<(&'a Registration, &'a Measured), String> {
     if let Some(why) = case.poor_fit() {
         return Err(why);
     }
-    let (Some(found), Some(focal)) = (case.registration, focal) else {
+    let (Some(found), Some(focal)) = (case.registration, &known.focal) else {
         return Err(why_unknown(case));
     };
     if focal.own_camera_ignores_distortion() {
@@ -97,6 +104,8 @@ fn why_unknown(case: &Case<'_>) -> String {
 struct Judged {
     verdict: Verdict,
     deviation: Estimate,
+    /// Of sensor to board, at the mean distance; else the slope.
+    is_ratio: bool,
     how: &'static str,
     /// Sensor over truth, as it would be corrected.
     scale: f64,
@@ -104,28 +113,29 @@ struct Judged {
 
 fn judged(case: &Case<'_>, found: &Registration, scaled: &Scaled) -> Judged {
     let [_, ratio, _] = scaled.ratios();
-    let judge = |deviation| Verdict::of(deviation, case.tolerances.depth_scale);
+    let judge = |deviation| Verdict::of(deviation, case.tolerances.of(Code::TD301));
     let somewhere = scaled.ratios().into_iter().any(|ratio| judge(ratio) == Verdict::Fault);
-    let (verdict, deviation, how) = match judge(scaled.slope) {
+    let (verdict, is_ratio, how) = match judge(scaled.slope) {
         // The slope tells a scale from a bias. Where it is too uncertain, depth at the recorded distances still is true
         // or not, and a wrong scale could hide there only behind a bias that makes up for it.
         Verdict::Unknown => (
             judge(ratio),
-            ratio,
-            "mean ratio of sensor to board; the slope over distance is too uncertain to decide",
+            true,
+            "Mean ratio of sensor to board; the slope over distance is too uncertain to decide",
         ),
         // A slope that a bias makes up for at every distance recorded has harmed nobody.
         Verdict::Fault if !somewhere => (
             judge(ratio),
-            ratio,
-            "mean ratio of sensor to board; the slope over distance is steeper, but a bias makes up for it",
+            true,
+            "Mean ratio of sensor to board; the slope over distance is steeper, but a bias makes up for it",
         ),
-        verdict => (verdict, scaled.slope, "slope over distance, from all of the board's surface"),
+        verdict => (verdict, false, "Slope over distance, from all of the board's surface"),
     };
+    let deviation = if is_ratio { ratio } else { scaled.slope };
     // Without a bias worth the name the mean ratio knows the scale best.
     let with_bias = found.bias_m.value.abs() > 3.0 * found.bias_m.sigma;
     let scale = 1.0 + if with_bias { deviation.value } else { ratio.value };
-    Judged { verdict, deviation, how, scale }
+    Judged { verdict, deviation, is_ratio, how, scale }
 }
 
 /// What TD301 would have depth divided by; 1 where the scale is not significantly another.
@@ -134,24 +144,28 @@ pub(super) fn divisor(case: &Case<'_>, found: &Registration, scaled: &Scaled) ->
     if matches!(judged.verdict, Verdict::Fault | Verdict::Info) { judged.scale } else { 1.0 }
 }
 
-pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
-    let mut finding = Finding::new(Code::TD301, Unit::Percent);
-    finding.tolerance = Some(100.0 * case.tolerances.depth_scale);
-    let (found, focal) = match basis(case, focal) {
+pub(super) fn check(case: &Case<'_>, known: &Known) -> Finding {
+    let mut finding = Finding::new(Code::TD301, &case.tolerances);
+    finding.show("1", "—");
+    let (found, focal) = match basis(case, known) {
         Ok(both) => both,
         Err(why) => {
-            finding.summary = format!("Cannot tell whether depth has the right scale: {why}.");
-            RECORD.clone_into(&mut finding.what_to_do);
-            return finding;
+            let claim = format!("Cannot tell whether depth has the right scale: {why}.");
+            return finding.unknown(claim, ToRecord::Distances);
         }
     };
     let scaled = Scaled::new(found, focal);
     let [_, ratio, _] = scaled.ratios();
     let [near_m, _, far_m] = scaled.distances_m;
-    let Judged { verdict, deviation, how, scale } = judged(case, found, &scaled);
+    let Judged { verdict, deviation, is_ratio, how, scale } = judged(case, found, &scaled);
     finding.verdict = verdict;
-    finding.value = Some(100.0 * deviation.value);
-    finding.sigma = Some(100.0 * deviation.sigma);
+    finding.measured(deviation);
+    // The deviation that was judged (a slope or a mean ratio), so that both columns tell the same.
+    let shown = Estimate { value: 1.0 + deviation.value, sigma: deviation.sigma };
+    finding.show("1", value_and_sigma(shown, 4));
+    if let (Some(row), true) = (&mut finding.quantity, is_ratio) {
+        row.name += " (mean ratio)";
+    }
     finding.evidence = vec![
         Evidence::estimate("scale", found.scale),
         Evidence::estimate(
@@ -171,15 +185,17 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
         Verdict::Ok => "Depth has the right scale",
         Verdict::Unknown | Verdict::Warning => "Cannot tell whether depth has the right scale",
     };
-    finding.summary = format!(
-        "{words}: {:+.2} +- {:.2} % between {near_m:.2} m and {far_m:.2} m ({how}; sigma includes {:.2} % of the focal \
-         length; {} samples in {} frames; tolerance {:.1} %).",
-        100.0 * deviation.value,
+    finding.claim = format!(
+        "{words}: {} ± {:.2} % between {near_m:.2} m and {far_m:.2} m.",
+        signed(100.0 * deviation.value, 2),
         100.0 * deviation.sigma,
+    );
+    finding.test = format!(
+        "{how}; σ includes {:.2} % of the focal length; {} samples in {} frames; {}.",
         100.0 * focal.relative_sigma(),
         found.n_patches,
         found.n_frames,
-        100.0 * case.tolerances.depth_scale,
+        finding.tolerance_words(),
     );
     match verdict {
         Verdict::Fault => {
@@ -189,7 +205,7 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
                 1e3 * case.board.square_m
             );
         }
-        Verdict::Unknown | Verdict::Warning => RECORD.clone_into(&mut finding.what_to_do),
+        Verdict::Unknown | Verdict::Warning => finding.record(ToRecord::Distances),
         Verdict::Info | Verdict::Ok => {}
     }
     finding.name_if_significant(Defect::DepthScale { ratio: scale });

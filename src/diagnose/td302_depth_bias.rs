@@ -1,22 +1,29 @@
 #![doc = include_str!("td302_depth_bias.md")]
 
 use super::{
-    Case, Code, Evidence, Finding, Unit, Verdict,
-    td201_focal_length::Measured,
-    td301_depth_scale::{RECORD, Scaled, basis, divisor},
+    Basis, Case, Check, Code, Evidence, Finding, Known, ToRecord, Tolerance, Unit, Verdict,
+    numbers::{in_mm, plain, signed, value_and_sigma},
+    td301_depth_scale::{Scaled, basis, divisor},
 };
 use crate::recording::Defect;
 
-pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
-    let mut finding = Finding::new(Code::TD302, Unit::Mm);
-    let tolerance_m = case.tolerances.depth_bias_m;
-    finding.tolerance = Some(1e3 * tolerance_m);
-    let (found, focal) = match basis(case, focal) {
+pub(super) const CHECK: Check = Check {
+    title: "Depth bias",
+    unit: Unit::Mm,
+    basis: Basis::Depth,
+    tolerance: Tolerance::named("depth-bias", 3.0),
+};
+
+pub(super) fn check(case: &Case<'_>, known: &Known) -> Finding {
+    let mut finding = Finding::new(Code::TD302, &case.tolerances);
+    let tolerance_m = case.tolerances.of(finding.code);
+    finding.show("0 mm", "—");
+    let (found, focal) = match basis(case, known) {
         Ok(both) => both,
         Err(why) => {
-            finding.summary = format!("Cannot tell whether depth has a bias: {why}.");
-            RECORD.clone_into(&mut finding.what_to_do);
-            return finding;
+            name_row(&mut finding, None);
+            let claim = format!("Cannot tell whether depth has a bias: {why}.");
+            return finding.unknown(claim, ToRecord::Distances);
         }
     };
     let scaled = Scaled::new(found, focal);
@@ -33,16 +40,17 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
             (
                 by_offset,
                 offset_m,
-                "at the mean of the recorded distances; followed down to 0 m it would be a guess",
+                "At the mean of the recorded distances; followed down to 0 m it would be a guess",
             )
         } else if doubtful {
-            (Verdict::Unknown, found.bias_m, "where the line of sensor over board meets 0 m")
+            (Verdict::Unknown, found.bias_m, "Where the line of sensor over board meets 0 m")
         } else {
-            (by_bias, found.bias_m, "where the line of sensor over board meets 0 m")
+            (by_bias, found.bias_m, "Where the line of sensor over board meets 0 m")
         };
     finding.verdict = verdict;
-    finding.value = Some(1e3 * deviation_m.value);
-    finding.sigma = Some(1e3 * deviation_m.sigma);
+    finding.measured(deviation_m);
+    finding.show("0 mm", format!("{} mm", value_and_sigma(in_mm(deviation_m), 2)));
+    name_row(&mut finding, (deviation_m == offset_m).then_some(found.center_m));
     finding.evidence = vec![
         Evidence::estimate("bias_m", found.bias_m),
         Evidence::estimate("offset_at_center_m", offset_m),
@@ -58,21 +66,21 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
         Verdict::Ok => "Depth has no bias",
         Verdict::Unknown | Verdict::Warning => "Cannot tell whether depth has a bias",
     };
-    finding.summary = format!(
-        "{words}: {:+.2} +- {:.2} mm, sensor minus board ({place}; tolerance {:.1} mm).",
-        1e3 * deviation_m.value,
+    finding.claim = format!(
+        "{words}: {} ± {:.2} mm, sensor minus board.",
+        signed(1e3 * deviation_m.value, 2),
         1e3 * deviation_m.sigma,
-        1e3 * tolerance_m,
     );
+    finding.test = format!("{place}; {}.", finding.tolerance_words());
     match verdict {
         Verdict::Fault => {
             finding.what_to_do = format!(
-                "Subtract {:.2} mm from depth{}.",
-                1e3 * bias_m,
+                "Subtract {} mm from depth{}.",
+                plain(1e3 * bias_m, 2),
                 if divisor == 1.0 { "" } else { ", then divide it as TD301 says" }
             );
         }
-        Verdict::Unknown | Verdict::Warning => RECORD.clone_into(&mut finding.what_to_do),
+        Verdict::Unknown | Verdict::Warning => finding.record(ToRecord::Distances),
         Verdict::Info | Verdict::Ok => {}
     }
     // Where the scale tells it all nothing is left.
@@ -80,4 +88,14 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
         finding.name_if_significant(Defect::DepthBias { bias_m });
     }
     finding
+}
+
+/// Says where the bias was measured, if not at 0 m.
+fn name_row(finding: &mut Finding, center_m: Option<f64>) {
+    if let Some(row) = &mut finding.quantity {
+        row.name = match center_m {
+            Some(center_m) => format!("Depth bias at {} m (sensor − board)", plain(center_m, 2)),
+            None => "Depth bias (sensor − board)".to_owned(),
+        };
+    }
 }

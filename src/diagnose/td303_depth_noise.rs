@@ -1,8 +1,18 @@
 #![doc = include_str!("td303_depth_noise.md")]
 
-use super::{Case, Code, Evidence, Finding, Unit, Verdict};
+use super::{
+    Basis, Case, Check, Code, Evidence, Finding, Known, ToRecord, Tolerance, Unit, Verdict,
+    numbers::plain,
+};
 use crate::depth::{STILL_PX, TemporalNoise};
 use crate::math;
+
+pub(super) const CHECK: Check = Check {
+    title: "Depth noise and holes",
+    unit: Unit::Percent,
+    basis: Basis::Depth,
+    tolerance: Tolerance::fixed(MANY_HOLES_PERCENT),
+};
 
 /// Share of holes within the sensor's reach beyond which a recording is short of depth, percent.
 const MANY_HOLES_PERCENT: f64 = 10.0;
@@ -14,18 +24,16 @@ const GROWTH_PER_M: f64 = 2.2e-3;
 /// So many times that is no sound sensor's noise.
 const MUCH: f64 = 4.0;
 
-pub(super) fn check(case: &Case<'_>) -> Finding {
-    let mut finding = Finding::new(Code::TD303, Unit::Percent);
-    finding.tolerance = Some(MANY_HOLES_PERCENT);
-    let record = "Record the board at 0.2 m to 0.4 m, not too slantingly, without direct sunlight.";
+pub(super) fn check(case: &Case<'_>, _: &Known) -> Finding {
+    let mut finding = Finding::new(Code::TD303, &case.tolerances);
     let Some(found) = case.registration else {
-        finding.summary = format!(
+        finding.show("", "—");
+        finding.evidence = evidence_between_frames(case.temporal_noise);
+        let claim = format!(
             "Cannot tell how noisy depth is: no own camera, or too few frames with depth on the board. {}",
             between_frames(case.temporal_noise),
         );
-        finding.evidence = evidence_between_frames(case.temporal_noise);
-        record.clone_into(&mut finding.what_to_do);
-        return finding;
+        return finding.unknown(claim, ToRecord::Unhindered);
     };
     let pattern = &found.pattern;
     let expected_m = math::hypot(FLOOR_M, found.center_m * found.center_m * GROWTH_PER_M);
@@ -34,6 +42,10 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
     let in_reach = holes.n_pixels_in_reach as f64 / holes.n_pixels.max(1) as f64;
     let share = holes.share_in_reach().filter(|_| in_reach >= LEAST_IN_REACH);
     finding.value = share.map(|share| 100.0 * share);
+    finding.show("", format!("{} mm noise", plain(1e3 * pattern.pixel_noise_m, 2)));
+    if let (Some(row), Some(percent)) = (&mut finding.quantity, finding.value) {
+        row.difference = Some(format!("{} % holes", plain(percent, 2)));
+    }
     finding.evidence = vec![
         Evidence::number("pixel_noise_mm", 1e3 * pattern.pixel_noise_m),
         Evidence::number("pixel_noise_of_a_sound_sensor_mm", 1e3 * expected_m),
@@ -65,7 +77,7 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
         },
         |share| format!("{:.2} % of the pixels on the board within reach are holes", 100.0 * share),
     );
-    finding.summary = format!(
+    finding.claim = format!(
         "{}: {numbers}; {gaps}. {}",
         match (noisy, torn) {
             (true, _) => "Depth is noisier than a sound sensor's",
@@ -74,13 +86,15 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
         },
         between_frames(case.temporal_noise),
     );
-    (finding.verdict, finding.what_to_do) = match (noisy || torn, share) {
+    match (noisy || torn, share) {
         (true, _) => {
-            (Verdict::Warning, format!("Clean the front glass, and look for sunlight. {record}"))
+            finding.verdict = Verdict::Warning;
+            let record = ToRecord::Unhindered.words();
+            finding.what_to_do = format!("Clean the front glass, and look for sunlight. {record}");
         }
-        (false, None) => (Verdict::Unknown, record.to_owned()),
-        (false, Some(_)) => (Verdict::Ok, String::new()),
-    };
+        (false, None) => finding.record(ToRecord::Unhindered),
+        (false, Some(_)) => finding.verdict = Verdict::Ok,
+    }
     finding
 }
 

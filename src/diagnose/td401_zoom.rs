@@ -1,32 +1,33 @@
 #![doc = include_str!("td401_zoom.md")]
 
 use super::{
-    Case, Code, Evidence, Finding, Unit, Verdict, td201_focal_length::Measured,
-    td301_depth_scale::basis,
+    Basis, Case, Check, Code, Evidence, Finding, Known, ToRecord, Tolerance, Unit, Verdict,
+    numbers::value_and_sigma, td301_depth_scale::basis,
 };
 use crate::{calibrate::Estimate, depth::Registration, recording::Defect};
 
-/// What makes zoom and shift observable.
-pub(super) const RECORD: &str = "Record 20 or more frames with the board tilted by 20 to 45 degrees to all sides, at \
-                                 0.2 m to 0.4 m: depth that does not vary over the image looks the same wherever it \
-                                 lies.";
+pub(super) const CHECK: Check = Check {
+    title: "Depth-to-colour zoom",
+    unit: Unit::Percent,
+    basis: Basis::Depth,
+    tolerance: Tolerance::named("zoom", 1.0),
+};
 
-pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
-    let mut finding = Finding::new(Code::TD401, Unit::Percent);
-    finding.tolerance = Some(100.0 * case.tolerances.zoom);
-    let found = match basis(case, focal) {
+pub(super) fn check(case: &Case<'_>, known: &Known) -> Finding {
+    let mut finding = Finding::new(Code::TD401, &case.tolerances);
+    finding.show("1", "—");
+    let found = match basis(case, known) {
         Ok((found, _)) => found,
         Err(why) => {
-            finding.summary = format!("Cannot tell whether depth is zoomed against colour: {why}.");
-            RECORD.clone_into(&mut finding.what_to_do);
-            return finding;
+            let claim = format!("Cannot tell whether depth is zoomed against colour: {why}.");
+            return finding.unknown(claim, ToRecord::Tilted);
         }
     };
     let zoom = found.zoom;
     let deviation = Estimate { value: zoom.value - 1.0, sigma: zoom.sigma };
-    finding.verdict = Verdict::of(deviation, case.tolerances.zoom);
-    finding.value = Some(100.0 * deviation.value);
-    finding.sigma = Some(100.0 * deviation.sigma);
+    finding.verdict = Verdict::of(deviation, case.tolerances.of(finding.code));
+    finding.measured(deviation);
+    finding.show("1", value_and_sigma(zoom, 4));
     finding.evidence = vec![
         Evidence::estimate("zoom", zoom),
         Evidence::estimate("zoom_by_slopes", found.slopes.zoom),
@@ -44,13 +45,11 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
         Verdict::Ok => "Depth and colour have the same zoom",
         Verdict::Unknown | Verdict::Warning => "Cannot tell whether depth is zoomed against colour",
     };
-    finding.summary = format!(
-        "{words}: {:.4} +- {:.4} of its width about the principal point ({}; tolerance {:.1} %).",
-        zoom.value,
-        zoom.sigma,
-        by_what(found),
-        100.0 * case.tolerances.zoom,
+    finding.claim = format!(
+        "{words}: {:.4} ± {:.4} of its width about the principal point.",
+        zoom.value, zoom.sigma,
     );
+    finding.test = format!("{}; {}.", by_what(found), finding.tolerance_words());
     match finding.verdict {
         Verdict::Fault => {
             finding.what_to_do = format!(
@@ -61,17 +60,17 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
                 edge_px(case, deviation.value)
             );
         }
-        Verdict::Unknown | Verdict::Warning => RECORD.clone_into(&mut finding.what_to_do),
+        Verdict::Unknown | Verdict::Warning => finding.record(ToRecord::Tilted),
         Verdict::Info | Verdict::Ok => {}
     }
     finding.name_if_significant(Defect::DepthZoom { zoom: [zoom.value; 2] });
     finding
 }
 
-/// What zoom and shift rest on, for the end of a sentence.
+/// What zoom and shift rest on, for the beginning of a test.
 pub(super) fn by_what(found: &Registration) -> String {
     let slopes = format!(
-        "from the slopes of tilted views, {} patches in {} frames",
+        "From the slopes of tilted views, {} patches in {} frames",
         found.n_patches, found.n_frames
     );
     match &found.imprint {

@@ -1,24 +1,29 @@
 #![doc = include_str!("td402_shift.md")]
 
 use super::{
-    Case, Code, Evidence, Finding, Unit, Verdict,
-    td201_focal_length::Measured,
+    Basis, Case, Check, Code, Evidence, Finding, Known, ToRecord, Tolerance, Unit, Verdict,
+    numbers::signed,
     td301_depth_scale::basis,
-    td401_zoom::{RECORD, by_what, witnesses},
+    td401_zoom::{by_what, witnesses},
 };
 use crate::{calibrate::Estimate, math, recording::Defect};
 
-pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
-    let mut finding = Finding::new(Code::TD402, Unit::Px);
-    let tolerance_px = case.tolerances.shift_px;
-    finding.tolerance = Some(tolerance_px);
-    let found = match basis(case, focal) {
+pub(super) const CHECK: Check = Check {
+    title: "Depth-to-colour shift",
+    unit: Unit::Px,
+    basis: Basis::Depth,
+    tolerance: Tolerance::named("shift", 1.0),
+};
+
+pub(super) fn check(case: &Case<'_>, known: &Known) -> Finding {
+    let mut finding = Finding::new(Code::TD402, &case.tolerances);
+    let tolerance_px = case.tolerances.of(finding.code);
+    finding.show("0, 0 px", "—");
+    let found = match basis(case, known) {
         Ok((found, _)) => found,
         Err(why) => {
-            finding.summary =
-                format!("Cannot tell whether depth is shifted against colour: {why}.");
-            RECORD.clone_into(&mut finding.what_to_do);
-            return finding;
+            let claim = format!("Cannot tell whether depth is shifted against colour: {why}.");
+            return finding.unknown(claim, ToRecord::Tilted);
         }
     };
     let [x, y] = found.shift_px;
@@ -27,6 +32,10 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
     let length_px = math::hypot(x.value, y.value);
     finding.value = Some(length_px);
     finding.sigma = Some(sigma_along(&found.covariance, [x, y]));
+    // With the σ of the difference in the next column; that of each axis stands in the evidence.
+    let decimals = if x.sigma.max(y.sigma) < 0.95 { 2 } else { 1 };
+    let cell = format!("{}, {} px", signed(x.value, decimals), signed(y.value, decimals));
+    finding.show("0, 0 px", cell);
     finding.evidence = vec![
         Evidence::estimate("shift_x_px", x),
         Evidence::estimate("shift_y_px", y),
@@ -46,21 +55,21 @@ pub(super) fn check(case: &Case<'_>, focal: Option<&Measured>) -> Finding {
             "Cannot tell whether depth is shifted against colour"
         }
     };
-    finding.summary = format!(
-        "{words}: {:+.2} +- {:.2} px to the right, {:+.2} +- {:.2} px down (either axis judged by itself; {}; \
-         tolerance {tolerance_px:.1} px).",
-        x.value,
+    finding.claim = format!(
+        "{words}: {} ± {:.2} px to the right, {} ± {:.2} px down.",
+        signed(x.value, 2),
         x.sigma,
-        y.value,
+        signed(y.value, 2),
         y.sigma,
-        by_what(found),
     );
+    finding.test =
+        format!("{}; either axis judged by itself; {}.", by_what(found), finding.tolerance_words());
     match finding.verdict {
         Verdict::Fault => {
             finding.what_to_do =
                 "Shift the depth map back before depth is looked up at a colour pixel.".to_owned();
         }
-        Verdict::Unknown | Verdict::Warning => RECORD.clone_into(&mut finding.what_to_do),
+        Verdict::Unknown | Verdict::Warning => finding.record(ToRecord::Tilted),
         Verdict::Info | Verdict::Ok => {}
     }
     finding.name_if_significant(Defect::DepthShift { shift_px: [x.value, y.value] });

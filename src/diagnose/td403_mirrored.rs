@@ -1,18 +1,21 @@
 #![doc = include_str!("td403_mirrored.md")]
 
-use super::{Case, Code, Evidence, Finding, Unit, Verdict};
+use super::{
+    Basis, Case, Check, Code, Evidence, Finding, Known, ToRecord, Unit, Verdict, numbers::plain,
+};
 use crate::{depth::Handedness, recording::Defect};
 
-pub(super) fn check(case: &Case<'_>) -> Finding {
-    let mut finding = Finding::new(Code::TD403, Unit::Count);
+pub(super) const CHECK: Check =
+    Check { title: "Mirroring", unit: Unit::Count, basis: Basis::Board, tolerance: None };
+
+pub(super) fn check(case: &Case<'_>, _: &Known) -> Finding {
+    let mut finding = Finding::new(Code::TD403, &case.tolerances);
     let (mirrored, n) = case.n_mirrored_of();
     if n == 0 {
-        finding.summary =
-            "Cannot tell whether the images are mirrored: the board was not seen in any frame."
-                .to_owned();
-        finding.what_to_do =
-            "Record frames that show the board sharp and from the front.".to_owned();
-        return finding;
+        finding.show("", "—");
+        let claim =
+            "Cannot tell whether the images are mirrored: the board was not seen in any frame.";
+        return finding.unknown(claim.to_owned(), ToRecord::Sharp);
     }
     finding.value = Some(mirrored as f64);
     finding.evidence = vec![
@@ -22,7 +25,7 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
     // The markers decode one way only; a single frame against all others is more likely a slip than a mirror.
     if 2 * mirrored > n {
         finding.verdict = Verdict::Fault;
-        finding.summary = format!(
+        finding.claim = format!(
             "The images are mirrored: in {mirrored} of {n} frames the markers read only as in a mirror."
         );
         finding.what_to_do = "Mirror colour and depth back, and the principal point with them. Make sure first that \
@@ -31,18 +34,20 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
         finding.defect = Some(Defect::Mirrored);
     } else if mirrored > 0 {
         finding.verdict = Verdict::Warning;
-        finding.summary = format!(
+        finding.claim = format!(
             "{mirrored} of {n} frames look mirrored and the others do not: frames of two kinds, or a wrong reading."
         );
         finding.what_to_do = "Look at these frames.".to_owned();
     } else {
         finding.verdict = Verdict::Ok;
-        finding.summary =
+        finding.claim =
             format!("The images are not mirrored: the markers read straight in all {n} frames.");
     }
     if let Some(depth) = case.handedness {
         add_depth(&mut finding, depth);
     }
+    let n = finding.value.unwrap_or(0.0);
+    finding.show("", if n > 0.0 { format!("in {} frames", plain(n, 0)) } else { "no".to_owned() });
     finding
 }
 
@@ -61,10 +66,10 @@ fn add_depth(finding: &mut Finding, depth: Handedness) {
     if n_mirrored >= LEAST_FRAMES && 10 * n_mirrored >= 9 * clear {
         let colour = std::mem::replace(&mut finding.verdict, Verdict::Fault);
         finding.value = Some(n_mirrored as f64);
-        finding.summary = format!(
+        finding.claim = format!(
             "The depth maps are mirrored against the colour images: in {n_mirrored} of {clear} frames with a tilted \
              board depth fits the board only when it is mirrored. {}",
-            finding.summary
+            finding.claim
         );
         // Colour mirrored and depth straight: it is colour that has to be turned, and that is what the finding says.
         if colour != Verdict::Fault {
@@ -72,7 +77,7 @@ fn add_depth(finding: &mut Finding, depth: Handedness) {
             finding.defect = Some(Defect::DepthMirrored);
         }
     } else if n_straight >= LEAST_FRAMES {
-        finding.summary += &format!(
+        finding.claim += &format!(
             " Depth lies as colour does in {n_straight} of {clear} frames with a tilted board."
         );
     }

@@ -1,13 +1,23 @@
 #![doc = include_str!("td502_reference_dimensions.md")]
 
-use super::{AcrossApis, Api, Case, Code, Evidence, Finding, KnownIssue, Sheet, Unit, Verdict};
+use super::{
+    AcrossApis, Api, Basis, Case, Check, Code, Evidence, Finding, Known, KnownIssue, Sheet,
+    Tolerances, Unit, Verdict, numbers::signed,
+};
+
+pub(super) const CHECK: Check = Check {
+    title: "Reference dimensions",
+    unit: Unit::Percent,
+    basis: Basis::Metadata,
+    tolerance: None,
+};
 
 /// Within one recording there is nothing to disagree with; the numbers are stated.
-pub(super) fn check(case: &Case<'_>) -> Finding {
-    let mut finding = Finding::new(Code::TD502, Unit::Percent);
+pub(super) fn check(case: &Case<'_>, _: &Known) -> Finding {
+    let mut finding = Finding::new(Code::TD502, &case.tolerances);
     let Some([width, height]) = case.factory.and_then(|f| f.reference_dimensions) else {
         finding.verdict = Verdict::Info;
-        finding.summary =
+        finding.claim =
             "The recording does not tell the reference dimensions of its intrinsics.".to_owned();
         return finding;
     };
@@ -16,7 +26,7 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
         Evidence::number("reference_width_px", width),
         Evidence::number("reference_height_px", height),
     ];
-    finding.summary = format!(
+    finding.claim = format!(
         "The intrinsics are given for images of {width:.0}x{height:.0} px. Whether the other API of this device says \
          the same takes a recording of each: `truedepth compare`."
     );
@@ -25,7 +35,7 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
 
 /// AVFoundation's parameters against ARKit's, of one device, and which correction the pair calls for.
 pub(super) fn between(av: &Sheet, ar: &Sheet, across: &AcrossApis) -> Finding {
-    let mut finding = Finding::new(Code::TD502, Unit::Percent);
+    let mut finding = Finding::new(Code::TD502, &Tolerances::default());
     let percent = 100.0 * across.reference_difference[0];
     finding.value = Some(percent);
     finding.evidence = vec![
@@ -36,19 +46,20 @@ pub(super) fn between(av: &Sheet, ar: &Sheet, across: &AcrossApis) -> Finding {
     ];
     let dimensions = |sheet: &Sheet| format!("{}x{}", sheet.reference[0], sheet.reference[1]);
     let numbers = format!(
-        "AVFoundation's reference dimensions are {}, ARKit's {} ({percent:+.1} %); depth focal lengths {:.2} and \
-         {:.2} px ({:+.1} %)",
+        "AVFoundation's reference dimensions are {}, ARKit's {} ({} %); depth focal lengths {:.2} and \
+         {:.2} px ({} %)",
         dimensions(av),
         dimensions(ar),
+        signed(percent, 1),
         av.focal_px,
         ar.focal_px,
-        100.0 * across.focal_difference
+        signed(100.0 * across.focal_difference, 1)
     );
     match across.issue {
         Some(KnownIssue::DepthZoom) => {
             finding.verdict = Verdict::Warning;
             let zoom = across.depth_zoom[0];
-            finding.summary = format!(
+            finding.claim = format!(
                 "{numbers}: one camera, two reference dimensions. Under ARKit depth appears zoomed against colour \
                  (issue 1 of the paper)."
             );
@@ -60,7 +71,7 @@ pub(super) fn between(av: &Sheet, ar: &Sheet, across: &AcrossApis) -> Finding {
         Some(_) => {
             finding.verdict = Verdict::Warning;
             let vga_px = across.av_corrected_px * 640.0 / av.reference[0];
-            finding.summary = format!(
+            finding.claim = format!(
                 "{numbers}: neither focal length is the camera's (issue 2 of the paper). Corrected by the paper's \
                  equations they are {:.2} px and {:.2} px, at 640 pixels {vga_px:.2} px and {:.2} px.",
                 across.av_corrected_px,
@@ -75,7 +86,7 @@ pub(super) fn between(av: &Sheet, ar: &Sheet, across: &AcrossApis) -> Finding {
         }
         None => {
             finding.verdict = Verdict::Ok;
-            finding.summary = format!("{numbers}: both APIs say the same.");
+            finding.claim = format!("{numbers}: both APIs say the same.");
         }
     }
     finding

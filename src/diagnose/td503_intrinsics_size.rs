@@ -1,7 +1,17 @@
 #![doc = include_str!("td503_intrinsics_size.md")]
 
-use super::{Case, Code, Evidence, Finding, Unit, Verdict};
+use super::{
+    Basis, Case, Check, Code, Evidence, Finding, Known, ToRecord, Tolerance, Unit, Verdict,
+    numbers::signed,
+};
 use crate::{camera::Intrinsics, recording::Defect};
+
+pub(super) const CHECK: Check = Check {
+    title: "Size the intrinsics are for",
+    unit: Unit::Percent,
+    basis: Basis::Metadata,
+    tolerance: Tolerance::fixed(100.0 * FARTHEST),
+};
 
 /// No phone's lens sits farther off the centre of its image than this, as a fraction of the image's size: decentring is
 /// a percent or so, and image stabilisation moves the lens by less than two.
@@ -35,13 +45,11 @@ pub(super) fn scaled(case: &Case<'_>) -> Option<Intrinsics> {
     Some(Intrinsics { fx: k.fx * x, cx: k.cx * x, fy: k.fy * y, cy: k.cy * y, ..k })
 }
 
-pub(super) fn check(case: &Case<'_>) -> Finding {
-    let mut finding = Finding::new(Code::TD503, Unit::Percent);
-    finding.tolerance = Some(100.0 * FARTHEST);
+pub(super) fn check(case: &Case<'_>, _: &Known) -> Finding {
+    let mut finding = Finding::new(Code::TD503, &case.tolerances);
     let Some(factory) = case.factory else {
-        finding.summary = "The recording has no factory intrinsics.".to_owned();
-        finding.what_to_do = "Record with an app that saves the intrinsics.".to_owned();
-        return finding;
+        let claim = "The recording has no factory intrinsics.".to_owned();
+        return finding.unknown(claim, ToRecord::Metadata);
     };
     let k = factory.intrinsics;
     let [width, height] = case.size_px.unwrap_or([k.width, k.height]).map(|n| n as f64);
@@ -56,22 +64,22 @@ pub(super) fn check(case: &Case<'_>) -> Finding {
     ];
     if off.abs() <= FARTHEST {
         finding.verdict = Verdict::Ok;
-        finding.summary = format!(
-            "The intrinsics are those of the {width}x{height} image: the principal point ({:.1}, {:.1}) lies {:+.1} % \
+        finding.claim = format!(
+            "The intrinsics are those of the {width}x{height} image: the principal point ({:.1}, {:.1}) lies {} % \
              off its centre.",
             k.cx,
             k.cy,
-            100.0 * off
+            signed(100.0 * off, 1)
         );
         return finding;
     }
     finding.verdict = Verdict::Fault;
-    finding.summary = format!(
-        "The intrinsics are not those of the {width}x{height} image: the principal point ({:.1}, {:.1}) lies {:+.0} % \
+    finding.claim = format!(
+        "The intrinsics are not those of the {width}x{height} image: the principal point ({:.1}, {:.1}) lies {} % \
          off its centre.",
         k.cx,
         k.cy,
-        100.0 * off
+        signed(100.0 * off, 0)
     );
     if let (Some(factor), Some([w, h])) = (factor(case), factory.reference_dimensions) {
         finding.what_to_do = format!(

@@ -268,7 +268,11 @@ fn a_true_recording_has_no_fault() {
     assert_eq!(state, StreamState::Rectified);
     for finding in &findings {
         assert!(matches!(finding.verdict, Verdict::Ok | Verdict::Info), "{finding:?}");
-        assert!(!finding.summary.is_empty() && finding.summary.ends_with('.'), "{finding:?}");
+        assert!(
+            finding.claim.ends_with('.')
+                && (finding.test.is_empty() || finding.test.ends_with('.')),
+            "{finding:?}"
+        );
         assert!(finding.defect.is_none(), "{finding:?}");
     }
 }
@@ -472,12 +476,12 @@ fn the_principal_point_of_mirrored_images() {
     world.mirrored = true;
     let finding = world.finding(Code::TD202);
     assert!(matches!(finding.verdict, Verdict::Ok | Verdict::Info), "{finding:?}");
-    assert!(finding.summary.contains("taken mirrored"), "{finding:?}");
+    assert!(finding.claim.contains("taken mirrored"), "{finding:?}");
     // A mirrored print: the images, and their principal point, are as they should be.
     world.factory.intrinsics.cx = 313.0;
     let finding = world.finding(Code::TD202);
     assert!(matches!(finding.verdict, Verdict::Ok | Verdict::Info), "{finding:?}");
-    assert!(!finding.summary.contains("taken mirrored"), "{finding:?}");
+    assert!(!finding.claim.contains("taken mirrored"), "{finding:?}");
 }
 
 /// What the metadata of two recordings say, without a registry.
@@ -497,7 +501,7 @@ fn two_recordings() {
     assert_eq!(first.findings[0].verdict, Verdict::Warning);
     assert!(first.findings[0].what_to_do.contains("0.9507"), "{first:?}");
     let second = pair((2016.0, 1781.8), (2880.0, 1916.2));
-    assert!(second.findings[0].summary.contains("issue 2"), "{second:?}");
+    assert!(second.findings[0].claim.contains("issue 2"), "{second:?}");
     let iphone = pair((4032.0, 2751.0), (4032.0, 2751.0));
     assert_eq!(iphone.findings[0].verdict, Verdict::Ok);
 
@@ -524,6 +528,6 @@ fn no_verdict_from_a_calibration_that_does_not_fit() {
     for code in [Code::TD201, Code::TD202, Code::TD203, Code::TD204, Code::TD301, Code::TD401] {
         let finding = findings.iter().find(|f| f.code == code).unwrap();
         assert_eq!(finding.verdict, Verdict::Unknown, "{finding:?}");
-        assert!(finding.summary.contains("4.80 px") && !finding.what_to_do.is_empty());
+        assert!(finding.claim.contains("4.80 px") && !finding.what_to_do.is_empty());
     }
 }

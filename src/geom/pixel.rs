@@ -1,11 +1,13 @@
 //! A position in an image.
 
 /// A position in an image, in pixels; integer coordinates are pixel *centres*, x to the right, y down.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Pixel {
     /// Column, pixels.
+    #[serde(rename = "x_px")]
     pub x: f64,
     /// Row, pixels.
+    #[serde(rename = "y_px")]
     pub y: f64,
 }
 

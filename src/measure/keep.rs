@@ -6,8 +6,8 @@ use crate::{
     geom::{Homography, Pixel},
 };
 
-/// So many frames with the board are kept in full, whatever the length of the recording: twice what a calibration takes.
-/// Of more, those whose views differ most.
+/// So many frames with the board are kept in full, whatever the length of the recording: twice what a calibration
+/// takes. Of more, those whose views differ most.
 pub const MAX_FRAMES_IN_FULL: usize = 240;
 
 /// Frames are thinned out in lots: so many may be kept beyond.
@@ -61,8 +61,8 @@ impl Keeper {
         Some([at(0.0, 0.0)?, at(right, 0.0)?, at(right, bottom)?, at(0.0, bottom)?])
     }
 
-    /// Of the two frames that look most alike the one with fewer corners goes, the later one of equals, until few enough
-    /// are left.
+    /// Of the two frames that look most alike the one with fewer corners goes, the later one of equals, until few
+    /// enough are left.
     fn thin(&mut self, frames: &mut [FrameMeasurement]) {
         let n = self.kept.len();
         let distance = |a: usize, b: usize| {

@@ -8,7 +8,7 @@ use crate::{
     depth::{Lattice, NoiseBetweenFrames},
     detect::{Detector, Observation},
     image::{DepthMap, Gray},
-    recording::{Factory, Frame, Problem, Recording},
+    recording::{Factory, Frame, Problem, Recording, same_shape},
 };
 
 /// What is known of a recording beside its images.
@@ -84,8 +84,8 @@ impl Measurer {
         found
     }
 
-    /// Reads a frame's depth map where the board was seen. On any thread. Its size may be another than that of the colour
-    /// image, but not its shape.
+    /// Reads a frame's depth map where the board was seen. On any thread. Its size may be another than that of the
+    /// colour image, but not its shape.
     pub fn look_at_depth(
         &self,
         found: &mut FrameMeasurement,
@@ -94,8 +94,7 @@ impl Measurer {
     ) -> Result<(), Error> {
         let color_size = found.size_px.unwrap_or([map.width(), map.height()]);
         let depth_size = [map.width(), map.height()];
-        let shape = |[width, height]: [usize; 2]| width as f64 / height as f64;
-        if !((shape(color_size) / shape(depth_size) - 1.0).abs() <= 0.01) {
+        if !same_shape(color_size, depth_size) {
             return Err(Error::Sizes {
                 recording: place.to_owned(),
                 color: found.color.clone().unwrap_or_default(),

@@ -1,10 +1,11 @@
 //! Everything that is measured of a recording before anything is judged, frame by frame or as a whole.
 //!
-//! A [`Measurer`] looks at one frame after the other: [`look`](Measurer::look) detects the board and reads depth where it
-//! was seen, on any thread; [`add`](Measurer::add) takes what was found in order of time; [`finish`](Measurer::finish)
-//! calibrates, compares depth with the board, and registers it with colour. [`measure`] is the loop over a
-//! [`Recording`]. Images are dropped as soon as they were looked at, and of frames that look alike all but some are
-//! summarised, so that memory does not grow with the number of frames ([`MAX_FRAMES_IN_FULL`]).
+//! A [`Measurer`] looks at one frame after the other: [`look`](Measurer::look) detects the board,
+//! [`look_at_depth`](Measurer::look_at_depth) reads depth where it was seen, both on any thread; [`add`](Measurer::add)
+//! takes what was found in order of time; [`finish`](Measurer::finish) calibrates, compares depth with the board, and
+//! registers it with colour. [`measure`] is the loop over a [`Recording`](crate::recording::Recording). Images are
+//! dropped as soon as they were looked at, and of frames that look alike all but some are summarised, so that memory
+//! does not grow with the number of frames ([`MAX_FRAMES_IN_FULL`]).
 //!
 //! ```no_run
 //! use truedepth::{

@@ -79,6 +79,12 @@ pub struct Factory {
 /// Sizes whose shapes differ by more than this share are not the same picture at two sizes.
 const SAME_SHAPE: f64 = 0.01;
 
+/// Whether two images may show the same picture at two sizes.
+pub(crate) fn same_shape(a: [usize; 2], b: [usize; 2]) -> bool {
+    let shape = |[width, height]: [usize; 2]| width as f64 / height as f64;
+    (shape(a) / shape(b) - 1.0).abs() <= SAME_SHAPE
+}
+
 impl Factory {
     /// Only a pinhole, and nothing else known.
     pub fn pinhole(intrinsics: Intrinsics) -> Self {
@@ -109,10 +115,10 @@ impl Factory {
         if own == size {
             return Some(self.clone());
         }
-        let [sx, sy] = [0, 1].map(|i| size[i] as f64 / own[i] as f64);
-        if !((sx / sy - 1.0).abs() <= SAME_SHAPE) {
+        if !same_shape(own, size) {
             return None;
         }
+        let [sx, sy] = [0, 1].map(|i| size[i] as f64 / own[i] as f64);
         let place = |p: Pixel| Pixel::new(p.x * sx, p.y * sy);
         let tables = self.tables.as_ref().map(|t| t.at_scale([sx, sy], size));
         Some(Self {

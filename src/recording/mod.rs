@@ -1,10 +1,10 @@
 //! Recordings, whatever app wrote them: frames in order of time, factory metadata, images on demand.
 //!
-//! A [`Recording`] has [`Frame`]s in order of time: a colour image and a depth map each, with its [`Factory`] metadata at
-//! the image's own size; what is odd but not fatal is listed as a [`Problem`]. Images are decoded when they are asked
-//! for, on as many threads as ask. A recording comes from [`Files`] in one of the [`FORMATS`] ([`discover`] tells which
-//! recordings a folder or archive holds), or from images in memory ([`Recording::in_memory`]). A [`Writer`] puts frames
-//! into an [`Output`](crate::files::Output).
+//! A [`Recording`] has [`Frame`]s in order of time: a colour image and a depth map each, with its [`Factory`] metadata
+//! at the image's own size; what is odd but not fatal is listed as a [`Problem`]. Images are decoded when they are
+//! asked for, on as many threads as ask. A recording comes from [`Files`] in one of the [`FORMATS`] ([`discover`] tells
+//! which recordings a folder or archive holds), or from images in memory ([`Recording::in_memory`]). A [`Writer`] puts
+//! frames into an [`Output`].
 //!
 //! Everything read is untrusted: names are checked, lengths and sizes are bounded by [`Limits`], and what does not
 //! fit is an [`Error`] with file, place and remedy. Lengths are metres and angles radians, whatever the files say; the
@@ -49,6 +49,7 @@ pub use discover::{Found, discover_in};
 pub use discover::{discover, discover_nested};
 pub use error::Error;
 pub use format::{FORMATS, Format, OVERLAY_ENDING, Writer, encode_depth, factories_in_metadata};
+pub(crate) use frame::same_shape;
 pub use frame::{Factory, Frame, FrameImage};
 pub use problem::Problem;
 
@@ -237,7 +238,8 @@ impl Recording {
         Error::Absent { path: self.place().to_owned(), what, frame }
     }
 
-    /// An image must have the size that the metadata say: the intrinsics hold for no other.
+    /// An image must have the size that the metadata say: the intrinsics hold for no other. A colour image must have
+    /// the shape of its depth map, or which depth belongs to which pixel is not known.
     fn check_size(
         &self,
         frame: usize,
@@ -245,16 +247,19 @@ impl Recording {
         size: [usize; 2],
         kind: usize,
     ) -> Result<(), Error> {
-        match image.size {
-            Some(expected) if expected != size => Err(Error::ImageSize {
-                file: self.path(&image.file),
-                size,
-                said_by: self.images.metadata_files()[kind].to_owned(),
-                expected,
-                frame: self.frames[frame].id.clone(),
-            }),
-            _ => Ok(()),
-        }
+        let depth = self.frames[frame].depth.as_ref().and_then(|depth| depth.size);
+        let (expected, kind) = match (image.size, depth) {
+            (Some(expected), _) if expected != size => (expected, kind),
+            (_, Some(depth)) if !same_shape(depth, size) => (depth, 1),
+            _ => return Ok(()),
+        };
+        Err(Error::ImageSize {
+            file: self.path(&image.file),
+            size,
+            said_by: self.images.metadata_files()[kind].to_owned(),
+            expected,
+            frame: self.frames[frame].id.clone(),
+        })
     }
 
     /// A file of the recording, for messages.

@@ -100,7 +100,7 @@ pub struct Drawn {
 }
 
 /// One picture.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct DrawnFrame {
     /// Index in the recording.
     pub frame: usize,

@@ -1,20 +1,11 @@
-//! Documents that cannot be read back, pictures that cannot be drawn.
+//! Pictures that cannot be drawn.
 
 use crate::{correct, files, recording};
 
-/// A document that cannot be read back, or a picture that cannot be drawn.
+/// A picture that cannot be drawn.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// Not JSON, not of a known schema, or a field is missing or of another type.
-    #[error(
-        "not a document of truedepth's wire version 1: {0}. Give a file that `truedepth calibrate --json`, \
-         `detect --json` or `audit --json` wrote"
-    )]
-    Document(String),
-    /// Numbers that make no camera.
-    #[error("not a camera: {0}. Take the file as `truedepth calibrate --json` wrote it")]
-    Camera(String),
     /// A file of the recording cannot be read, or a picture not be written.
     #[error(transparent)]
     Recording(#[from] recording::Error),

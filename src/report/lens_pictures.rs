@@ -43,7 +43,7 @@ pub struct LensDrawn {
 }
 
 /// One picture.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct LensFrame {
     /// Index in the recording.
     pub frame: usize,

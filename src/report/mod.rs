@@ -1,7 +1,7 @@
-//! What leaves the library: JSON, HTML, SVG, and the words for a terminal.
+//! What leaves the library for readers: HTML, SVG, and the words for a terminal.
 //!
-//! An [`Audit`](crate::audit::Audit) leaves in three forms that say the same. [`wire`] is the versioned form for
-//! programs, written by [`to_json`]; [`summary`] is what a person reads in ten seconds on a terminal, as lines of
+//! An [`Audit`](crate::audit::Audit) leaves in three forms that say the same. [`wire`](crate::wire) is the versioned
+//! form for programs; [`summary`] is what a person reads in ten seconds on a terminal, as lines of
 //! [`Span`]s with a [`Tone`] each ([`overview`]: several recordings beside each other); [`page`] is one HTML file with
 //! the verdicts first and the evidence behind them,
 //! with the recording's [`Pictures`]: photos ([`Photo`]) with what the detector saw in them ([`Overlay`]), and a few
@@ -28,12 +28,12 @@
 
 mod depth_pictures;
 mod depth_style;
+mod documents;
 mod drawing;
 mod error;
 mod figures;
 mod frames;
 mod html;
-mod json;
 mod lens_pictures;
 mod next;
 mod overlay;
@@ -43,7 +43,6 @@ mod pictures;
 mod sheet;
 mod svg;
 mod text;
-pub mod wire;
 mod words;
 
 #[cfg(test)]
@@ -51,10 +50,10 @@ mod sample;
 
 pub use depth_pictures::{After, Animation, DepthPictures, Drawn, DrawnFrame, Flip, Range};
 pub use depth_style::{DepthStyle, Shown, depth_range_m};
+pub use documents::{OverlayDocument, UndistortDocument};
 pub use error::Error;
 pub use figures::FIGURES;
 pub use html::page;
-pub use json::to_json;
 pub use lens_pictures::{LensDrawn, LensFrame, LensPictures, state_in_words};
 pub use next::Typed;
 pub use overlay::Overlay;

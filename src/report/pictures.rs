@@ -102,7 +102,7 @@ impl Pictures {
     /// more than 60 a spread), twelve of them large (the four whose view fits worst, the frame with the fewest corners,
     /// others spread evenly), and depth of four in which much of the board was seen.
     ///
-    /// Errors: as [`Recording::rgb`] and [`Recording::depth`], of the first frame that has one.
+    /// Errors: as [`Recording::color`] and [`Recording::depth`], of the first frame that has one.
     pub fn read(recording: &Recording, audit: &Audit) -> Result<Self, recording::Error> {
         Self::read_beside(recording, audit, Thumbnails::new(recording))
     }

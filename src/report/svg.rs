@@ -1,7 +1,6 @@
 //! What all figures share: numbers as text, scales, axes.
 
-use crate::math;
-
+use crate::{diagnose::numbers::minus, math};
 use maud::{Markup, html};
 
 /// Width of every figure in its own units. The page shows two beside each other on a desk and one on a phone, so the
@@ -108,15 +107,6 @@ pub(super) fn domain_of(values: impl IntoIterator<Item = f64>, fallback: [f64; 2
     }
     let air = if high > low { 0.06 * (high - low) } else { 0.5 * low.abs().max(1.0) };
     [low - air, high + air]
-}
-
-/// The number with a true minus sign, and no sign on zero.
-pub(super) fn minus(number: &str) -> String {
-    match number.strip_prefix('-') {
-        Some(digits) if digits.chars().all(|c| matches!(c, '0' | '.')) => digits.to_owned(),
-        Some(digits) => format!("−{digits}"),
-        None => number.to_owned(),
-    }
 }
 
 /// A drawing area with a horizontal and a vertical scale.

@@ -102,7 +102,7 @@ pub fn summary(audit: &Audit, typed: &Typed, width: usize) -> Vec<Line> {
     let loud = |f: &&Finding| matches!(f.verdict, Verdict::Fault | Verdict::Warning);
     for finding in words::by_severity(audit).into_iter().filter(loud) {
         lines.push(Line::default());
-        lines.extend(paragraph(finding.code.name(), &finding.summary, prose));
+        lines.extend(paragraph(finding.code.name(), &finding.summary(), prose));
         lines.extend(to_do(&finding.what_to_do, prose));
     }
     for group in words::cannot_tell(audit) {
@@ -153,7 +153,7 @@ fn open_question(group: &words::CannotTell<'_>, prose: usize) -> Vec<Line> {
         }
         None => {
             for finding in &group.findings {
-                lines.extend(paragraph(finding.code.name(), &finding.summary, prose));
+                lines.extend(paragraph(finding.code.name(), &finding.summary(), prose));
             }
         }
     }
@@ -404,8 +404,8 @@ mod tests {
     #[test]
     fn ten_seconds() {
         let audit = sample::audit();
-        sample::assert_golden("summary.txt", &plain(&audit, 100));
-        sample::assert_golden("summary-narrow.txt", &plain(&audit, 60));
+        sample::assert_golden("report/golden/summary.txt", &plain(&audit, 100));
+        sample::assert_golden("report/golden/summary-narrow.txt", &plain(&audit, 60));
     }
 
     #[test]

@@ -13,7 +13,7 @@
 //! let worked = &paper.sections[0].checks;
 //! assert!(worked.iter().all(|check| check.status == Status::Agrees));
 //! assert!(paper.missing.iter().any(|missing| missing.how.contains("git clone")));
-//! # Ok::<(), truedepth::audit::Error>(())
+//! # Ok::<(), truedepth::measure::Error>(())
 //! ```
 //!
 //! Not here: pages and pictures ([`report`](crate::report)), looking for recordings
@@ -44,7 +44,7 @@ pub struct Section {
 }
 
 /// Something of the paper that cannot be reproduced here.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct Missing {
     /// What.
     pub what: String,

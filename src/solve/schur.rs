@@ -11,10 +11,10 @@ use crate::par::vectorized;
 /// So many parameters can be shared.
 pub const MAX_SHARED: usize = 12;
 
-/// A least-squares problem of up to [`MAX_SHARED`] shared parameters, any number of *loose* ones, and any number of blocks of `B`
-/// parameters each: a residual depends on the shared parameters, on one block, and on one loose parameter at most (or
-/// on a [`Mixture`](super::Mixture) of several).
-/// Bundle adjustment of intrinsics (shared), heights of a board's corners (loose) and poses (blocks) is one.
+/// A least-squares problem of up to [`MAX_SHARED`] shared parameters, any number of *loose* ones, and any number of
+/// blocks of `B` parameters each: a residual depends on the shared parameters, on one block, and on one loose parameter
+/// at most (or on a [`Mixture`](super::Mixture) of several). Bundle adjustment of intrinsics (shared), heights of a
+/// board's corners (loose) and poses (blocks) is one.
 ///
 /// Its normal equations have the shape of an arrow; the blocks are eliminated one by one (Schur complement), so that
 /// time and memory grow linearly with their number. With u the shared and loose parameters together:
@@ -93,8 +93,8 @@ impl<const B: usize> Loose<B> {
     }
 }
 
-/// A residual (observed − predicted) of a block of `B` parameters, its weight in the sum of squares, and the derivatives
-/// of the *prediction*.
+/// A residual (observed − predicted) of a block of `B` parameters, its weight in the sum of squares, and the
+/// derivatives of the *prediction*.
 #[derive(Clone, Copy, Debug)]
 pub struct Row<const B: usize> {
     /// In the sum of squares.

@@ -130,13 +130,13 @@ fn noise_between_frames() {
         assert!((5e-5..1.5e-4).contains(&at.noise_m.value), "{name}: {at:?}");
         assert!(at.noise_m.value + 3.0 * at.noise_m.sigma < at.one_frame_m, "{name}: {at:?}");
         let noise = finding(&audit, Code::TD303);
-        assert!(noise.summary.contains("a pixel comes and goes by"), "{noise:?}");
+        assert!(noise.claim.contains("a pixel comes and goes by"), "{noise:?}");
     }
     // Held by hand, a frame every second: nothing to compare.
     let Some(audit) = run(IPAD4, Method::Auto) else { return };
     assert_eq!(audit.temporal_noise.by_range, []);
     let noise = finding(&audit, Code::TD303);
-    assert!(noise.summary.contains("cannot be told"), "{noise:?}");
+    assert!(noise.claim.contains("cannot be told"), "{noise:?}");
 }
 
 /// Same input, same findings, whatever the threads did.

@@ -31,11 +31,6 @@ const FORBIDDEN: &[(&str, &[&str], &str)] = &[
     ("std::fs", &["files"], "only `files` opens files"),
     ("File::", &["files"], "only `files` opens files"),
     ("super::super", &[], "say `crate::room::...`, so that the order of rooms can be checked"),
-    (
-        "Serialize",
-        &["report", "recording", "correct"],
-        "only `report::wire` and defects are serialised outward",
-    ),
     ("HashMap", &[], "hash order must never reach a result; use BTreeMap"),
     ("HashSet", &[], "hash order must never reach a result; use BTreeSet"),
 ];
@@ -46,13 +41,6 @@ const TRANSCENDENTAL: &[&str] = &[
     "exp2", "exp_m1", "hypot", "ln", "ln_1p", "log", "log10", "log2", "mul_add", "powf", "sin",
     "sin_cos", "sinh", "tan", "tanh",
 ];
-
-/// Single files excepted from [`FORBIDDEN`], each with its reason.
-const EXCEPTIONS: &[(&str, &str, &str)] = &[(
-    "simulate/truth.rs",
-    "Serialize",
-    "truth.json is a file format of its own, versioned by its schema, not the domain type",
-)];
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -208,10 +196,7 @@ fn the_library_touches_nothing_outside() {
         for path in files {
             let code = product_code(&read(&path));
             for (word, allowed, why) in FORBIDDEN {
-                let excepted = EXCEPTIONS
-                    .iter()
-                    .any(|(file, of, _)| path.ends_with(Path::new("src").join(file)) && of == word);
-                if allowed.contains(&room.as_str()) || excepted {
+                if allowed.contains(&room.as_str()) {
                     continue;
                 }
                 for line in lines_with(&code, word) {

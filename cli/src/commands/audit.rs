@@ -11,11 +11,12 @@ use truedepth::{
     image::Rgb,
     measure::{FrameMeasurement, Method, Observer, Progress},
     recording::{Found, Recording},
-    report::{self, Overview, Pictures, Thumbnails, Typed, wire},
+    report::{self, Overview, Pictures, Thumbnails, Typed},
+    wire,
 };
 
 use crate::{
-    args::{self, AuditArgs, Tolerance},
+    args::{self, AuditArgs},
     failure::Failure,
     files::{self, ReportFolder},
     input,
@@ -79,16 +80,8 @@ fn options(args: &AuditArgs) -> Result<Options, Failure> {
     let mut options = Options::new(method);
     options.max_views = args.views;
     options.board = input::board(&args.input.board)?;
-    for tolerance in &args.tolerances {
-        match *tolerance {
-            Tolerance::Focal(fraction) => options.tolerances.focal = fraction,
-            Tolerance::DepthScale(fraction) => options.tolerances.depth_scale = fraction,
-            Tolerance::DepthBiasM(bias_m) => options.tolerances.depth_bias_m = bias_m,
-            Tolerance::DistortionPx(px) => options.tolerances.distortion_px = px,
-            Tolerance::PrincipalPointPx(px) => options.tolerances.principal_point_px = px,
-            Tolerance::Zoom(fraction) => options.tolerances.zoom = fraction,
-            Tolerance::ShiftPx(px) => options.tolerances.shift_px = px,
-        }
+    for text in &args.tolerances {
+        options.tolerances = options.tolerances.with(text)?;
     }
     Ok(options)
 }
@@ -143,7 +136,7 @@ fn one(
             seen.name()
         ));
     }
-    let json = report::to_json(&wire::Document::Audit(Box::new(wire::Audit::from(&audit))));
+    let json = wire::to_json(&wire::Audit::new(&audit, args.detail.detail()));
     let report = folder.as_ref().map(|folder| folder.json().display().to_string());
     let typed = Typed { recording: recording_typed, report };
     if let (Some(folder), Some(thumbnails)) = (&folder, thumbnails) {

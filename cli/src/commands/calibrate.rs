@@ -5,13 +5,16 @@ use std::path::Path;
 use truedepth::{
     board::CharucoBoard,
     calibrate::{
-        self, FrameCorners, Input as Views, Method, Model, RollingShutter, calibrate_from,
-        coverage, guess_intrinsics,
+        self, Calibration, Estimate, FrameCorners, Input as Views, Method, Model, RollingShutter,
+        calibrate_from, coverage, guess_intrinsics,
     },
-    export::{self, Format},
+    camera::Camera,
     measure::{Measurer, look_for_board},
     recording::{Factory, Recording},
-    report::{self, wire},
+    wire::{
+        self,
+        export::{self, Format},
+    },
 };
 
 use crate::{
@@ -34,15 +37,34 @@ pub(crate) fn run(args: &CalibrateArgs, terminal: &Terminal) -> Result<Outcome, 
         Method::Plain(_) => "plain",
     };
     let (name, calibration) = measure(&seen, method, args.views)?;
-    let document = wire::Calibration::new(&name, named, seen.factory.as_ref(), &calibration);
+    let factory = seen.factory.as_ref();
+    let detail = args.detail.detail();
+    let document =
+        || wire::to_json(&wire::Calibration::new(&name, named, factory, &calibration, detail));
     if let (Some(file), Some(format)) = (&args.export, format) {
-        write(file, format, &document, args, terminal)?;
+        let text = match format {
+            None => document(),
+            Some(format) => exported(file, format, &name, &calibration.camera, terminal),
+        };
+        let replace = if args.force { Replace::WhatIsThere } else { Replace::Nothing };
+        write_together(&[(file.clone(), text.into_bytes())], replace)?;
+        terminal.say(&format!("calibration: {}", file.display()));
     }
     if args.json.json {
-        let document = wire::Document::Calibrate(Box::new(document));
-        terminal.result(&report::to_json(&document))?;
+        terminal.result(&document())?;
     } else {
-        terminal.result(&table(&document, seen.n_images))?;
+        let factory_px = factory.map(|f| f.intrinsics.focal_px());
+        let how = match named {
+            "paper" => "--method paper",
+            "auto" => "--method auto",
+            "plain" => "--model, as OpenCV's calibrateCamera",
+            _ => "--model",
+        };
+        let model = format!("{} ({how})", calibration.model.name());
+        let rows = [("recording", name.clone()), ("model", model)].into_iter();
+        let rows = rows.chain(table(&calibration, factory_px, seen.n_images));
+        let lines: String = rows.map(|(name, value)| format!("{name:<16}  {value}\n")).collect();
+        terminal.result(&lines)?;
     }
     if 2 * seen.frames.len() < seen.n_images {
         terminal.warn(&format!(
@@ -206,33 +228,25 @@ fn format_of(file: &Path, typed: Option<ExportFormat>) -> Result<Option<Format>,
     }
 }
 
-fn write(
+/// The camera in this format; what the format does not hold is said.
+fn exported(
     file: &Path,
-    format: Option<Format>,
-    document: &wire::Calibration,
-    args: &CalibrateArgs,
+    format: Format,
+    name: &str,
+    camera: &Camera,
     terminal: &Terminal,
-) -> Result<(), Failure> {
-    let text = match format {
-        None => report::to_json(&wire::Document::Calibrate(Box::new(document.clone()))),
-        Some(format) => {
-            let exported = export::calibration(&document.camera()?, &document.recording, format);
-            if let Some(residual) = exported.residual {
-                terminal.warn(&format!(
-                    "{}: {} does not hold this lens; the one written differs by {:.3} px (RMS; at most {:.3} px)",
-                    file.display(),
-                    format.name(),
-                    residual.rms_px,
-                    residual.max_px
-                ));
-            }
-            exported.text
-        }
-    };
-    let replace = if args.force { Replace::WhatIsThere } else { Replace::Nothing };
-    write_together(&[(file.to_owned(), text.into_bytes())], replace)?;
-    terminal.say(&format!("calibration: {}", file.display()));
-    Ok(())
+) -> String {
+    let exported = export::calibration(camera, name, format);
+    if let Some(residual) = exported.residual {
+        terminal.warn(&format!(
+            "{}: {} does not hold this lens; the one written differs by {:.3} px (RMS; at most {:.3} px)",
+            file.display(),
+            format.name(),
+            residual.rms_px,
+            residual.max_px
+        ));
+    }
+    exported.text
 }
 
 type Row = (&'static str, String);
@@ -243,35 +257,30 @@ fn count(n: usize, what: &str) -> String {
 }
 
 /// What a person wants to know, in columns.
-fn table(calibration: &wire::Calibration, n_images: usize) -> String {
-    let how = match calibration.method.as_str() {
-        "paper" => "--method paper",
-        "auto" => "--method auto",
-        "plain" => "--model, as OpenCV's calibrateCamera",
-        _ => "--model",
-    };
-    let mut rows = vec![
-        ("recording", calibration.recording.clone()),
-        ("model", format!("{} ({how})", calibration.model)),
-    ];
-    rows.extend(camera_rows(calibration));
-    let without = n_images.saturating_sub(calibration.n_views + calibration.rejected.len());
+fn table(calibration: &Calibration, factory_px: Option<f64>, n_images: usize) -> Vec<Row> {
+    let mut rows = camera_rows(calibration, factory_px);
+    let n_views = calibration.views.len();
+    let without = n_images.saturating_sub(n_views + calibration.rejected.len());
     rows.push((
         "fit",
         format!(
             "rms {:.3} px over {} corners of {} views; of {}, {without} without the board and {} not used; {} left out",
             calibration.rms_px,
-            calibration.n_corners,
-            calibration.n_views,
+            calibration.n_corners(),
+            n_views,
             count(n_images, "image"),
             calibration.rejected.len(),
             count(calibration.outliers.len(), "outlier"),
         ),
     ));
     if let Some(chosen) = &calibration.chosen {
-        let cost = chosen.focal_sigma_ratio.map_or(String::new(), |ratio| {
-            format!("; with all of them, σ from corner noise would be {ratio:.2} times smaller")
-        });
+        let ratio = chosen.focal_sigma_ratio;
+        let cost = match ratio.is_finite() {
+            true => {
+                format!("; with all of them, σ from corner noise would be {ratio:.2} times smaller")
+            }
+            false => String::new(),
+        };
         rows.push((
             "views chosen",
             format!(
@@ -289,10 +298,10 @@ fn table(calibration: &wire::Calibration, n_images: usize) -> String {
             if i == 0 { "models tried" } else { "" },
             format!(
                 "{:<18}  rms {} px, held out {} px, focal length {} px",
-                candidate.model,
+                candidate.model.name(),
                 number(candidate.rms_px),
                 held_out(candidate.held_out_rms_px, candidate.held_out_sigma_px),
-                focal(candidate.focal_px, candidate.focal_sigma_px),
+                with_sigma(candidate.focal_px, 2),
             ),
         ));
     }
@@ -301,98 +310,98 @@ fn table(calibration: &wire::Calibration, n_images: usize) -> String {
             if i == 0 { "boards tried" } else { "" },
             format!(
                 "{:<18}  rms {} px, held out {} px, focal length {} px",
-                surface.kind,
+                surface.kind.name(),
                 number(surface.rms_px),
                 held_out(surface.held_out_rms_px, surface.held_out_sigma_px),
-                focal(surface.focal_px, surface.focal_sigma_px),
+                with_sigma(surface.focal_px, 2),
             ),
         ));
     }
-    rows.iter().map(|(name, value)| format!("{name:<16}  {value}\n")).collect()
+    rows
 }
 
-fn camera_rows(calibration: &wire::Calibration) -> Vec<Row> {
-    let mut focal = with_sigma(calibration.focal_px, calibration.focal_sigma_px, 2);
-    focal.push_str(" px");
-    let [fx, fy] = calibration.focal_xy_px;
-    if fx != fy {
-        focal.push_str(&format!(" (fx {fx:.2}, fy {fy:.2})"));
+fn camera_rows(calibration: &Calibration, factory_px: Option<f64>) -> Vec<Row> {
+    let k = &calibration.camera.intrinsics;
+    // The fit's own number is the horizontal one.
+    let sigma = calibration.focal_px().sigma * k.focal_px() / k.fx;
+    let mut focal = with_sigma(Estimate { value: k.focal_px(), sigma }, 2) + " px";
+    if k.fx != k.fy {
+        focal.push_str(&format!(" (fx {:.2}, fy {:.2})", k.fx, k.fy));
     }
-    if let (Some(factory), Some(difference)) =
-        (calibration.factory_focal_px, calibration.focal_difference_percent)
-    {
+    if let Some(factory) = factory_px {
+        let difference = 100.0 * (k.focal_px() / factory - 1.0);
         focal.push_str(&format!("   factory {factory:.2} px, {difference:+.2} %"));
     }
-    let sigma_of =
-        |name: &str| calibration.parameters.iter().find(|p| p.name == name).and_then(|p| p.sigma);
-    let is_free = calibration.parameters.iter().any(|p| p.name == "center_x_px");
-    let fixed = match (is_free, calibration.factory_focal_px) {
-        (true, _) => "",
-        (false, Some(_)) => " (the factory's, not measured)",
-        (false, None) => " (not measured)",
+    let fixed = match (calibration.parameter("center_x_px"), factory_px) {
+        (Some(_), _) => "",
+        (None, Some(_)) => " (the factory's, not measured)",
+        (None, None) => " (not measured)",
     };
-    let [x, y] = calibration.principal_point_px;
-    let center = [(x, "center_x_px"), (y, "center_y_px")]
-        .map(|(value, name)| with_sigma(value, sigma_of(name), 2));
+    let center = [(k.cx, "center_x_px"), (k.cy, "center_y_px")].map(|(value, name)| {
+        let free = calibration.parameter(name);
+        with_sigma(Estimate { value, sigma: free.map_or(f64::NAN, |e| e.sigma) }, 2)
+    });
     let mut rows = vec![
         ("focal length", focal),
         ("principal point", format!("({}, {}) px{fixed}", center[0], center[1])),
     ];
     for parameter in &calibration.parameters {
         if !parameter.name.ends_with("_px") {
-            let value = with_sigma(parameter.value, parameter.sigma, 4);
+            let value = with_sigma(parameter.estimate, 4);
             rows.push(("", format!("{} {value}", parameter.name)));
         }
     }
     rows
 }
 
-fn board_row(calibration: &wire::Calibration) -> Option<Row> {
-    let surface = calibration.board_surface.as_ref()?;
+fn board_row(calibration: &Calibration) -> Option<Row> {
+    let surface = calibration.surface.as_ref()?;
+    let times =
+        |factor: f64, e: Estimate| Estimate { value: factor * e.value, sigma: factor * e.sigma };
     let mut text = format!(
         "not flat ({}): {} mm from its highest to its lowest corner",
-        surface.kind,
-        with_sigma(surface.peak_to_valley_mm?, surface.peak_to_valley_sigma_mm, 3)
+        surface.kind.name(),
+        with_sigma(times(1e3, surface.size_m()), 3)
     );
-    if let (Some(stretch), Some(shear)) = (surface.print_stretch, surface.print_shear) {
-        let percent =
-            |value: f64, sigma: Option<f64>| with_sigma(100.0 * value, sigma.map(|s| 100.0 * s), 3);
+    if let Some([stretch, shear]) = surface.print.map(|print| print.map(|e| times(100.0, e))) {
         text.push_str(&format!(
             "; print stretched by {} %, sheared by {} %",
-            percent(stretch, surface.print_stretch_sigma),
-            percent(shear, surface.print_shear_sigma),
+            with_sigma(stretch, 3),
+            with_sigma(shear, 3),
         ));
     }
     Some(("board", text))
 }
 
-fn stability_rows(calibration: &wire::Calibration) -> Vec<Row> {
+fn stability_rows(calibration: &Calibration) -> Vec<Row> {
     let mut rows = Vec::new();
-    if let Some([a, b]) = calibration.split_half_focal_px {
-        let [sigma_a, sigma_b] = calibration.split_half_focal_sigma_px.unwrap_or([None, None]);
-        let [a, b] = [with_sigma(a, sigma_a, 2), with_sigma(b, sigma_b, 2)];
+    let k = &calibration.camera.intrinsics;
+    // Of the mean of both focal lengths.
+    let mean = k.focal_px() / k.fx;
+    if let Some(halves) = calibration.split_half_focal_px {
+        let [a, b] = halves.map(|half| {
+            with_sigma(Estimate { value: mean * half.value, sigma: mean * half.sigma }, 2)
+        });
         rows.push(("two halves", format!("focal length {a} px and {b} px")));
     }
-    let without: Vec<f64> = calibration.left_out.iter().filter_map(|l| l.focal_px).collect();
+    let without: Vec<f64> =
+        calibration.left_out.iter().map(|l| mean * l.focal_px).filter(|f| f.is_finite()).collect();
     if let (Some(low), Some(high)) =
         (without.iter().copied().reduce(f64::min), without.iter().copied().reduce(f64::max))
     {
         rows.push(("each left out", format!("focal length {low:.2} to {high:.2} px")));
     }
-    if let Some(wire::RollingShutter {
-        residual_share: Some(share),
-        focal_shift_px: Some(shift),
-        ..
-    }) = &calibration.rolling_shutter
+    if let Some(RollingShutter { residual_share: share, focal_shift_px: shift, .. }) =
+        calibration.rolling_shutter
     {
         let percent = 100.0 * share;
         let [still, moving] = RollingShutter::STILL_TO_MOVING;
-        let words = if *share < moving {
+        let words = if share < moving {
             format!(
                 "views moved while read: with velocities residuals fall to {percent:.0} %, and the focal length comes \
                  out {shift:+.2} px away, less surely; hold the device still"
             )
-        } else if *share < still {
+        } else if share < still {
             format!(
                 "views moved a little while read: with velocities residuals fall to {percent:.0} %, and the focal \
                  length comes out {shift:+.2} px away, less surely"
@@ -402,9 +411,11 @@ fn stability_rows(calibration: &wire::Calibration) -> Vec<Row> {
         };
         rows.push(("rolling shutter", words));
     }
-    if let Some(grid) = &calibration.projection_uncertainty {
-        let sigmas: Vec<f64> = grid.sigma_px.iter().copied().flatten().collect();
-        let at = |index: usize| grid.sigma_px.get(index).copied().flatten().unwrap_or(f64::NAN);
+    let grid =
+        calibration.median_distance_m().and_then(|m| calibration.projection_uncertainty(17, 13, m));
+    if let Some(grid) = grid {
+        let sigmas: Vec<f64> = grid.sigma_px.iter().copied().filter(|s| s.is_finite()).collect();
+        let at = |index: usize| grid.sigma_px[index];
         rows.push((
             "projection",
             format!(
@@ -425,21 +436,18 @@ fn stability_rows(calibration: &wire::Calibration) -> Vec<Row> {
     rows
 }
 
-fn number(value: Option<f64>) -> String {
-    value.map_or("-".to_owned(), |v| format!("{v:.3}"))
+fn number(value: f64) -> String {
+    if value.is_finite() { format!("{value:.3}") } else { "-".to_owned() }
 }
 
-fn held_out(value: Option<f64>, sigma: Option<f64>) -> String {
-    value.map_or("-".to_owned(), |v| with_sigma(v, sigma, 3))
+fn held_out(value: f64, sigma: f64) -> String {
+    with_sigma(Estimate { value, sigma }, 3)
 }
 
-fn focal(value: Option<f64>, sigma: Option<f64>) -> String {
-    value.map_or("-".to_owned(), |f| with_sigma(f, sigma, 2))
-}
-
-fn with_sigma(value: f64, sigma: Option<f64>, decimals: usize) -> String {
-    match sigma {
-        Some(sigma) => format!("{value:.decimals$} ± {sigma:.decimals$}"),
-        None => format!("{value:.decimals$}"),
+fn with_sigma(Estimate { value, sigma }: Estimate, decimals: usize) -> String {
+    match (value.is_finite(), sigma.is_finite()) {
+        (true, true) => format!("{value:.decimals$} ± {sigma:.decimals$}"),
+        (true, false) => format!("{value:.decimals$}"),
+        (false, _) => "-".to_owned(),
     }
 }

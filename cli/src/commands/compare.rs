@@ -2,7 +2,8 @@
 
 use truedepth::{
     diagnose::{self, Comparison, Registry},
-    report::{self, Tone, wire},
+    report::Tone,
+    wire,
 };
 
 use crate::{args::CompareArgs, failure::Failure, input, outcome::Outcome, terminal::Terminal};
@@ -21,8 +22,8 @@ pub(crate) fn run(args: &CompareArgs, terminal: &Terminal) -> Result<Outcome, Fa
         _ => diagnose::pairs(&registry),
     };
     if args.json.json {
-        let document = wire::Document::Compare(wire::Compare::new(&pairs));
-        terminal.result(&report::to_json(&document))?;
+        let document = wire::Compare::new(&pairs);
+        terminal.result(&wire::to_json(&document))?;
     } else {
         let texts: Vec<String> = pairs.iter().map(|pair| words(pair, terminal)).collect();
         terminal.result(&texts.join("\n"))?;
@@ -111,7 +112,7 @@ fn words(pair: &Comparison, terminal: &Terminal) -> String {
             "\n{}  {}  {}\n",
             finding.code,
             finding.verdict.name(),
-            finding.summary
+            finding.claim
         ));
         if !finding.what_to_do.is_empty() {
             text.push_str(&format!("       → {}\n", finding.what_to_do));

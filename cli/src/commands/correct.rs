@@ -8,11 +8,11 @@ use std::{
 use truedepth::{
     audit::Options,
     correct::{Plan, Progress, Reason, Sampling, Selection, Step, correct_observed},
-    diagnose::{self, Api},
+    diagnose::{self, Api, Finding},
     files::{AtomicFolder, Output},
     measure::Method,
     recording::Recording,
-    report::{self, wire},
+    wire,
 };
 
 use super::audit::observed;
@@ -60,7 +60,7 @@ pub(crate) fn run(args: &CorrectArgs, terminal: &Terminal) -> Result<Outcome, Fa
     bar.finish_and_clear();
     let document = wire::Correct::new(&recording, &plan, done, findings);
     let words = words(&document, &args.output);
-    let json = report::to_json(&wire::Document::Correct(Box::new(document)));
+    let json = wire::to_json(&document);
     sink.write(PROVENANCE, json.as_bytes())?;
     sink.commit()?;
     if args.json.json {
@@ -87,7 +87,7 @@ pub(super) fn plan(
     asked: &Asked<'_>,
     recording: &Recording,
     terminal: &Terminal,
-) -> Result<(Plan, Vec<wire::FindingInfo>), Failure> {
+) -> Result<(Plan, Vec<Finding>), Failure> {
     let said = || {
         let none = || Failure::new(format!("{} has no factory metadata", recording.place()));
         recording.factory().map(|f| f.intrinsics).ok_or_else(none)
@@ -98,11 +98,11 @@ pub(super) fn plan(
             options.board = input::board(&asked.input.board)?;
             let audit = observed(recording, &options, terminal)?;
             let plan = Plan::of_audit(&audit, asked.selection)?;
-            let findings = taken(asked, &plan, wire::Audit::from(&audit).findings, terminal);
+            let findings = taken(asked, &plan, audit.findings, terminal);
             return Ok((plan, findings));
         }
         Steps::With(path) => match input::document(path)? {
-            wire::Document::Audit(audit) => {
+            wire::Input::Audit(audit) => {
                 let plan = audit.plan(asked.selection)?;
                 let findings = taken(asked, &plan, audit.findings, terminal);
                 return Ok((plan, findings));
@@ -123,21 +123,21 @@ pub(super) fn plan(
 fn taken(
     asked: &Asked<'_>,
     plan: &Plan,
-    findings: Vec<wire::FindingInfo>,
+    findings: Vec<Finding>,
     terminal: &Terminal,
-) -> Vec<wire::FindingInfo> {
+) -> Vec<Finding> {
     let (taken, left): (Vec<_>, Vec<_>) = findings
         .into_iter()
         .filter(|finding| finding.defect.is_some())
-        .partition(|f| plan.steps().iter().any(|step| step.reason.name() == f.code));
+        .partition(|f| plan.steps().iter().any(|step| step.reason == Reason::Finding(f.code)));
     for finding in &taken {
-        terminal.detail(&format!("{}: {}", finding.code, finding.summary));
+        terminal.detail(&format!("{}: {}", finding.code, finding.claim));
     }
     if asked.selection == Selection::Faults {
         for finding in left {
             terminal.say(&format!(
                 "left alone, within the tolerance: {}: {} (--within-tolerance corrects it)",
-                finding.code, finding.summary
+                finding.code, finding.claim
             ));
         }
     }

@@ -3,12 +3,14 @@
 use std::sync::Arc;
 
 use truedepth::{
-    audit::Options,
+    audit::{Audit, Options},
+    calibrate::Estimate,
     files::{Limits, Memory},
     measure::Method,
     recording::{Defect, Recording},
-    report::{self, Tone, Typed, wire},
+    report::{self, Tone, Typed},
     simulate::{Device, Faults, Plan, Truth},
+    wire,
 };
 
 use super::audit::{observed, page, show};
@@ -46,9 +48,7 @@ pub(crate) fn run(args: &DemoArgs, terminal: &Terminal) -> Result<Outcome, Failu
 
     terminal.say("auditing it as if nothing were known of it\n");
     let audit = observed(&recording, &Options::new(Method::Auto), terminal)?;
-    let found = wire::Audit::from(&audit);
-    let document = wire::Document::Audit(Box::new(found.clone()));
-    let json = report::to_json(&document);
+    let json = wire::to_json(&wire::Audit::new(&audit, wire::Detail::Summary));
     let typed = Typed {
         recording: RECORDING.to_owned(),
         report: Some(folder.json().display().to_string()),
@@ -61,7 +61,7 @@ pub(crate) fn run(args: &DemoArgs, terminal: &Terminal) -> Result<Outcome, Failu
         terminal.result(&json)?;
     } else {
         terminal.lines(&report::summary(&audit, &typed, terminal.width()))?;
-        terminal.result(&beside(&truth, &found, terminal))?;
+        terminal.result(&beside(&truth, &audit, terminal))?;
     }
     let flags: Vec<String> = faults.iter().map(|fault| format!("--fault {fault}")).collect();
     terminal.say(&format!("\nthe report:    {}", file_url(&folder.html())));
@@ -80,30 +80,23 @@ pub(crate) fn run(args: &DemoArgs, terminal: &Terminal) -> Result<Outcome, Failu
 }
 
 /// What was put into the simulation beside what came out of the audit.
-fn beside(truth: &Truth, found: &wire::Audit, terminal: &Terminal) -> String {
-    let estimate = |value: Option<f64>, sigma: Option<f64>, decimals: usize| match (value, sigma) {
-        (Some(value), Some(sigma)) => format!("{value:.decimals$} ± {sigma:.decimals$}"),
-        (Some(value), None) => format!("{value:.decimals$}"),
-        (None, _) => "cannot tell".to_owned(),
+fn beside(truth: &Truth, found: &Audit, terminal: &Terminal) -> String {
+    let estimate = |estimate: Option<Estimate>, decimals: usize| match estimate {
+        Some(Estimate { value, sigma }) => format!("{value:.decimals$} ± {sigma:.decimals$}"),
+        None => "cannot tell".to_owned(),
     };
-    let calibration = found.calibration.as_ref();
-    let depth = found.depth.as_ref();
+    let focal_px = found
+        .calibration
+        .as_ref()
+        .map(|c| Estimate { value: c.camera.intrinsics.focal_px(), sigma: c.focal_px().sigma });
     let rows = [
-        (
-            "focal length, px",
-            format!("{:.2}", truth.camera.focal_px),
-            estimate(
-                calibration.map(|c| c.focal_px),
-                calibration.and_then(|c| c.focal_sigma_px),
-                2,
-            ),
-        ),
+        ("focal length, px", format!("{:.2}", truth.camera.focal_px), estimate(focal_px, 2)),
         (
             "depth scale",
             format!("{:.4}", truth.depth.scale),
-            estimate(depth.and_then(|d| d.scale), depth.and_then(|d| d.scale_sigma), 4),
+            estimate(found.registration.as_ref().map(|r| r.scale), 4),
         ),
-        ("stream", truth.camera.stream.clone(), found.distortion_state.clone()),
+        ("stream", truth.camera.stream.clone(), found.distortion_state.name().to_owned()),
     ];
     let head = format!("{:<18}{:<14}{}", "", "truth", "found");
     let mut text = format!("\n{}\n", terminal.paint(Tone::Strong, &head));

@@ -12,10 +12,8 @@ use truedepth::{
     image::Rgb,
     measure::{FrameMeasurement, Measurer, Observer, Progress, look_for_board},
     recording::{Found, Recording},
-    report::{
-        self, Overlay,
-        wire::{self, DetectedImage},
-    },
+    report::Overlay,
+    wire::{self, DetectedImage},
 };
 
 use crate::{
@@ -61,8 +59,8 @@ pub(crate) fn run(args: &DetectArgs, terminal: &Terminal) -> Result<Outcome, Fai
         terminal.say(&format!("overlays: {}", folder.display()));
     }
     if args.json.json {
-        let document = wire::Document::Detect(wire::Detect { images });
-        terminal.result(&report::to_json(&document))?;
+        let document = wire::Detect { images };
+        terminal.result(&wire::to_json(&document))?;
     } else {
         terminal.result(&table(&images))?;
     }
@@ -160,17 +158,18 @@ impl Search<'_> {
             match one {
                 Ok(one) => {
                     let file = one.color.as_deref().unwrap_or_default();
-                    let shown = Path::new(recording.place()).join(file).display().to_string();
-                    let [width, height] = one.size_px.unwrap_or_default();
-                    let mut image =
-                        DetectedImage::new(shown, (width, height).into(), &one.observation);
-                    if let (true, [Some(start), Some(decoded), Some(looked)]) =
-                        (self.args.timings, times[frame])
-                    {
-                        image.decode_ms = Some(1e3 * (decoded - start).as_secs_f64());
-                        image.detect_ms = Some(1e3 * (looked - decoded).as_secs_f64());
-                    }
-                    self.images.push(image);
+                    let [start, decoded, looked] = times[frame];
+                    let milliseconds = |from: Option<Instant>, to: Option<Instant>| {
+                        let both = from.zip(to).filter(|_| self.args.timings);
+                        both.map(|(from, to)| 1e3 * (to - from).as_secs_f64())
+                    };
+                    self.images.push(DetectedImage {
+                        path: Path::new(recording.place()).join(file).display().to_string(),
+                        size_px: one.size_px.unwrap_or_default(),
+                        decode_ms: milliseconds(start, decoded),
+                        detect_ms: milliseconds(decoded, looked),
+                        observation: one.observation,
+                    });
                 }
                 Err(failure) => self.failed(&failure),
             }
@@ -237,12 +236,13 @@ fn table(images: &[DetectedImage]) -> String {
     let mut text = String::new();
     for image in images {
         let path = &image.path;
-        let found = match &image.layout {
-            Some(layout) => {
-                let identity = image.identity.as_ref();
-                let mirrored = if identity.is_some_and(|i| i.mirrored) { " mirrored" } else { "" };
-                let inverted = if identity.is_some_and(|i| i.inverted) { " inverted" } else { "" };
-                format!("{:>4} corners  {layout}{mirrored}{inverted}", image.corners.len())
+        let n = image.observation.corners.len();
+        let found = match &image.observation.identity {
+            Some(identity) => {
+                let layout = identity.layout.name();
+                let mirrored = if identity.mirrored { " mirrored" } else { "" };
+                let inverted = if identity.inverted { " inverted" } else { "" };
+                format!("{n:>4} corners  {layout}{mirrored}{inverted}")
             }
             None => "   no board".to_owned(),
         };
@@ -253,8 +253,8 @@ fn table(images: &[DetectedImage]) -> String {
         text.truncate(text.trim_end().len());
         text.push('\n');
     }
-    let n_found = images.iter().filter(|image| image.board_found).count();
-    let n_corners: usize = images.iter().map(|image| image.corners.len()).sum();
+    let n_found = images.iter().filter(|image| image.observation.identity.is_some()).count();
+    let n_corners: usize = images.iter().map(|image| image.observation.corners.len()).sum();
     text.push_str(&format!("{n_corners} corners; board in {n_found} of {} images\n", images.len()));
     text
 }

@@ -3,7 +3,8 @@
 use truedepth::{
     diagnose::{Certainty, Inspection, Verdict, inspect},
     recording::Recording,
-    report::{self, Tone, wire},
+    report::Tone,
+    wire,
 };
 
 use crate::{args::InspectArgs, failure::Failure, input, outcome::Outcome, terminal::Terminal};
@@ -13,9 +14,7 @@ pub(crate) fn run(args: &InspectArgs, terminal: &Terminal) -> Result<Outcome, Fa
     let recording = Recording::open(&args.recording, &input::limits(&args.input))?;
     let inspection = inspect(&recording, &registry);
     if args.json.json {
-        let document =
-            wire::Document::Inspect(Box::new(wire::Inspect::new(&recording, &inspection)));
-        terminal.result(&report::to_json(&document))?;
+        terminal.result(&wire::to_json(&wire::Inspect::new(&recording, &inspection)))?;
     } else {
         terminal.result(&words(&recording, &inspection, terminal))?;
         terminal.say(&format!(
@@ -98,7 +97,7 @@ fn words(recording: &Recording, inspection: &Inspection<'_>, terminal: &Terminal
     for finding in &inspection.findings {
         let tone = Tone::of(finding.verdict);
         let verdict = terminal.paint(tone, &format!("{:<8}", finding.verdict.name()));
-        text.push_str(&format!("{}  {verdict}  {}\n", finding.code, finding.summary));
+        text.push_str(&format!("{}  {verdict}  {}\n", finding.code, finding.claim));
         if !finding.what_to_do.is_empty() && finding.verdict <= Verdict::Warning {
             text.push_str(&format!("                 → {}\n", finding.what_to_do));
         }

@@ -6,7 +6,8 @@ use truedepth::{
     correct::{Plan, Selection},
     files::AtomicFolder,
     recording::Recording,
-    report::{self, After, Animation, DepthPictures, DepthStyle, Drawn, Flip, Range, Shown, wire},
+    report::{self, After, Animation, DepthPictures, DepthStyle, Drawn, Flip, Range, Shown},
+    wire,
 };
 
 use super::correct::{Asked, plan, refuse_inside};
@@ -53,8 +54,8 @@ pub(crate) fn run(args: &OverlayArgs, terminal: &Terminal) -> Result<Outcome, Fa
     bar.finish_and_clear();
     sink.commit()?;
     if args.json.json {
-        let document = wire::Overlay::new(&pictures, &drawn);
-        terminal.result(&report::to_json(&wire::Document::Overlay(Box::new(document))))?;
+        let document = report::OverlayDocument::new(&pictures, &drawn);
+        terminal.result(&wire::to_json(&document))?;
     } else {
         terminal.result(&words(&drawn, &args.output))?;
     }

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use truedepth::{
     recording::discover_nested,
-    report::{self, PaperPictures, Tone, wire},
+    report::{self, PaperPictures, Tone},
     reproduce::{Data, Reproduction, Status, reproduce},
+    wire,
 };
 
 use crate::{
@@ -42,8 +43,8 @@ pub(crate) fn run(args: &ReproduceArgs, terminal: &Terminal) -> Result<Outcome, 
         bar.inc(1);
     })?;
     bar.finish_and_clear();
-    let document = wire::Document::Reproduce(Box::new(wire::Reproduce::from(&paper)));
-    let json = report::to_json(&document);
+    let document = wire::Reproduce::from(&paper);
+    let json = wire::to_json(&document);
     if let Some(folder) = &folder {
         folder.write(&json, &report::paper_page(&paper, &PaperPictures::read(&paper)?))?;
     }

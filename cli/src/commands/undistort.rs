@@ -4,7 +4,8 @@ use truedepth::{
     correct::Rectifier,
     files::AtomicFolder,
     recording::Recording,
-    report::{self, LensPictures, wire},
+    report::{self, LensPictures},
+    wire,
 };
 
 use super::correct::refuse_inside;
@@ -34,8 +35,8 @@ pub(crate) fn run(args: &UndistortArgs, terminal: &Terminal) -> Result<Outcome, 
     bar.finish_and_clear();
     sink.commit()?;
     if args.json.json {
-        let document = wire::Undistort::new(&recording, &rectifier, &drawn);
-        terminal.result(&report::to_json(&wire::Document::Undistort(Box::new(document))))?;
+        let document = report::UndistortDocument::new(&recording, &rectifier, &drawn);
+        terminal.result(&wire::to_json(&document))?;
     } else {
         terminal.result(&format!(
             "{}: {} pictures\n{}\n",

@@ -136,13 +136,13 @@ fn a_simulated_fault_is_found_whatever_the_number_of_threads() {
 
     let report = json(&one.stdout);
     let truth = json(&read(scratch.join("rec/truth.json")));
-    let focal = report["calibration"]["focal_px"].as_f64().expect("a focal length");
-    let sigma = report["calibration"]["focal_sigma_px"].as_f64().expect("its sigma");
+    let focal = report["calibration"]["focal_px"]["value"].as_f64().expect("a focal length");
+    let sigma = report["calibration"]["focal_px"]["sigma"].as_f64().expect("its sigma");
     let true_focal = truth["camera"]["focal_px"].as_f64().expect("a true focal length");
     assert!((focal - true_focal).abs() < 4.0 * sigma, "{focal} ± {sigma}, truly {true_focal}");
     let td201 =
         report["findings"].as_array().expect("findings").iter().find(|f| f["code"] == "TD201");
-    assert_eq!(td201.expect("TD201")["severity"], "fault");
+    assert_eq!(td201.expect("TD201")["verdict"], "fault");
 
     let run = truedepth_in(scratch.path(), ["calibrate", "rec", "--json"]).code(0);
     assert_eq!(json(&run.stdout)["focal_px"], report["calibration"]["focal_px"]);
@@ -166,7 +166,9 @@ fn a_simulated_fault_is_found_whatever_the_number_of_threads() {
     truedepth_in(scratch.path(), ["audit", "rec", "--json", "--calibration", "other.json"])
         .code(1)
         .says(&["of another camera"]);
-    let error = |report: &Value| report["depth"]["own_median_error_mm"].as_f64().expect("depth");
+    let error = |report: &Value| {
+        1e3 * report["depth"]["own_median_error_m"]["value"].as_f64().expect("depth")
+    };
     assert!((error(&given) - error(&report)).abs() < 0.1, "{} {}", error(&given), error(&report));
 
     // A layout that the images contradict.
@@ -209,7 +211,7 @@ fn the_demo_finds_what_it_put_in() {
     for code in ["TD201", "TD301"] {
         let finding =
             report["findings"].as_array().expect("findings").iter().find(|f| f["code"] == code);
-        assert_eq!(finding.expect(code)["severity"], "fault", "{code}");
+        assert_eq!(finding.expect(code)["verdict"], "fault", "{code}");
     }
     assert!(read(scratch.join("truedepth-demo/report.html")).starts_with("<!DOCTYPE html>"));
 }
@@ -231,7 +233,7 @@ fn images_need_a_board_to_look_for() {
     let found = json(&run.stdout);
     assert_eq!(found["schema"], "truedepth.detect/1");
     let image = &found["images"][0];
-    assert_eq!((&image["width"], &image["board_found"]), (&Value::from(64), &Value::from(false)));
+    assert_eq!((&image["size_px"][0], &image["identity"]), (&Value::from(64), &Value::Null));
     assert!(image.get("detect_ms").is_none(), "times are said only where asked for");
 }
 

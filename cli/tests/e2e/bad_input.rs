@@ -217,6 +217,6 @@ fn no_board_in_any_frame_is_a_report() {
         .iter()
         .find(|finding| finding["code"] == "TD201")
         .expect("a finding about the focal length");
-    assert_eq!(focal["severity"], "unknown", "{focal}");
+    assert_eq!(focal["verdict"], "unknown", "{focal}");
     assert!(report.join("report.html").exists());
 }

@@ -60,7 +60,7 @@ fn calibrates_recordings_and_images() {
     assert_eq!(one.stdout, run(&["rec", "--json", "--threads", "2"]).code(0).stdout);
     let found = json(&one.stdout);
     assert_eq!(found["schema"], "truedepth.calibrate/1");
-    let focal = found["focal_px"].as_f64().expect("a number");
+    let focal = found["focal_px"]["value"].as_f64().expect("a number");
     assert!((focal / 530.0 - 1.0).abs() < 0.01, "{focal}");
     let grid = &found["projection_uncertainty"];
     assert_eq!((&grid["columns"], &grid["rows"]), (&Value::from(17), &Value::from(13)));
@@ -81,7 +81,7 @@ fn calibrates_recordings_and_images() {
     let focal_of = |folder: &str, more: &[&str]| {
         let mut args = vec![folder, "--board", BOARD, "--json"];
         args.extend(more);
-        json(&run(&args).code(0).stdout)["focal_px"].as_f64().expect("a number")
+        json(&run(&args).code(0).stdout)["focal_px"]["value"].as_f64().expect("a number")
     };
     let (forwards, backwards) = (focal_of("images", &[]), focal_of("backwards", &[]));
     assert!((forwards - backwards).abs() < 1e-4 * forwards, "{forwards} {backwards}");

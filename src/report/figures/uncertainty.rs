@@ -50,7 +50,7 @@ pub(in crate::report) fn projection_uncertainty(audit: &Audit) -> Option<Figure>
                     plain(pixel.x, 0),
                     plain(pixel.y, 0),
                     plain(sigma_px, decimals),
-                    plain(grid.sigma_mm[at], 3)
+                    plain(1e3 * grid.sigma_m[at], 3)
                 ),
             }
         })
@@ -90,7 +90,7 @@ pub(in crate::report) fn projection_uncertainty(audit: &Audit) -> Option<Figure>
                         plain(grid.pixels[at].x, 0),
                         plain(grid.pixels[at].y, 0),
                         plain(grid.sigma_px[at], 4),
-                        plain(grid.sigma_mm[at], 4),
+                        plain(1e3 * grid.sigma_m[at], 4),
                     ]
                 })
                 .collect(),

@@ -94,7 +94,6 @@ pub(super) fn chip(verdict: Verdict) -> Markup {
 
 fn full(audit: &Audit, finding: &Finding) -> Markup {
     let difference = words::difference(finding);
-    let (sentence, _) = words::sentence_and_test(&finding.summary);
     html! {
         article class=(format!("finding {}", finding.verdict.name())) id=(finding.code.name()) {
             header {
@@ -107,7 +106,7 @@ fn full(audit: &Audit, finding: &Finding) -> Markup {
                 @if let Some(gauge) = figures::finding_gauge(finding) { (gauge) }
             }
             div class="words" {
-                p class="summary" { (prose(&sentence)) }
+                p class="summary" { (prose(&finding.claim)) }
                 @if !finding.what_to_do.is_empty() {
                     p class="to-do" { strong { "What to do. " } (prose(&finding.what_to_do)) }
                 }
@@ -160,7 +159,7 @@ fn cannot_tell(audit: &Audit, group: &words::CannotTell<'_>) -> Markup {
                         @if group.why.is_some() {
                             details class="data" {
                                 summary { (finding.title()) }
-                                p { (prose(&finding.summary)) }
+                                p { (prose(&finding.claim)) }
                                 (evidence(audit, finding))
                             }
                         } @else { (open_question(audit, finding)) }
@@ -176,7 +175,7 @@ fn open_question(audit: &Audit, finding: &Finding) -> Markup {
     let difference = words::difference(finding);
     html! {
         div {
-            p { (prose(&words::sentence_and_test(&finding.summary).0)) }
+            p { (prose(&finding.claim)) }
             details class="data" { summary { "Evidence" } (evidence(audit, finding)) }
         }
         div class="measure" {
@@ -192,14 +191,13 @@ fn list(audit: &Audit, findings: &[&Finding]) -> Markup {
         @if !findings.is_empty() {
             ul class="quiet" {
                 @for finding in findings {
-                    @let (sentence, _) = words::sentence_and_test(&finding.summary);
                     li id=(finding.code.name()) {
                         details {
                             summary {
                                 (chip(finding.verdict))
                                 span class="code" { (finding.code) }
                                 span {
-                                    strong { (finding.title()) ". " } (prose(&sentence))
+                                    strong { (finding.title()) ". " } (prose(&finding.claim))
                                     @if !finding.what_to_do.is_empty() { " " (prose(&finding.what_to_do)) }
                                 }
                             }
@@ -221,9 +219,9 @@ fn list(audit: &Audit, findings: &[&Finding]) -> Markup {
 
 /// How sure, by which test, on which frames, with which numbers.
 fn evidence(audit: &Audit, finding: &Finding) -> Markup {
-    let (_, test) = words::sentence_and_test(&finding.summary);
+    let test = Some(&finding.test).filter(|test| !test.is_empty());
     let how_sure = words::how_sure(finding);
-    let frames = words::frames_behind(audit, finding.code);
+    let frames = words::frames_behind(audit, finding.basis);
     let is_bare =
         how_sure.is_none() && test.is_none() && frames.is_none() && finding.evidence.is_empty();
     html! {
@@ -233,7 +231,7 @@ fn evidence(audit: &Audit, finding: &Finding) -> Markup {
         @if how_sure.is_some() || test.is_some() || frames.is_some() {
             dl class="evidence-list" {
                 @if let Some(how_sure) = how_sure { dt { "How sure" } dd { (words::unbroken(&how_sure)) } }
-                @if let Some(test) = test { dt { "Test" } dd { (words::unbroken(&test)) } }
+                @if let Some(test) = test { dt { "Test" } dd { (words::unbroken(test)) } }
                 @if let Some(frames) = frames {
                     dt { "Frames" }
                     dd { (words::count(frames.len(), "frame")) ": " (words::ranges(&frames)) }

@@ -6,7 +6,7 @@
 
 Programs that are not installed are named and passed over. Kalibr and ROS read plain YAML (kalibr_common.ConfigReader,
 camera_calibration_parsers); neither is on PyPI, so that PyYAML reads theirs and the fields are compared with what their
-documentation says. The camera is the one of the test in src/export/mod.rs.
+documentation says. The camera is the one of the test in src/wire/export/mod.rs.
 """
 
 import importlib.util

@@ -2,24 +2,21 @@
 
 use std::collections::BTreeMap;
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
-use super::{Audit, Distortion, FindingInfo};
+use super::{Distortion, Document};
 use crate::{
     camera::Intrinsics,
-    correct::{Corrected, Plan, Selection, Step},
-    diagnose::{Code, Verdict},
+    correct::{Corrected, Plan, Step},
+    diagnose::Finding,
     recording::Recording,
-    report::Error,
 };
 
-/// What was corrected, and from what.
+/// What was corrected, and from what: what `truedepth correct --json` prints and `provenance.json` holds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Correct {
     /// Name of the input.
     pub recording: String,
-    /// Version of truedepth.
-    pub version: String,
     /// SHA-256 of what `sha256sum *` prints in the input's folder.
     pub input_sha256: String,
     /// What was removed, and why.
@@ -39,7 +36,7 @@ pub struct Correct {
     /// Files of the input that were left out, because they do not count there either.
     pub left_out: Vec<String>,
     /// The findings that asked for it; empty where no audit did.
-    pub findings: Vec<FindingInfo>,
+    pub findings: Vec<Finding>,
     /// Every file of the input.
     pub files: BTreeMap<String, String>,
     /// What the input's own `provenance.json` said, where it was a corrected recording already.
@@ -47,7 +44,7 @@ pub struct Correct {
 }
 
 /// A pinhole.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PinholeInfo {
     /// Focal lengths.
     pub focal_xy_px: [f64; 2],
@@ -57,13 +54,17 @@ pub struct PinholeInfo {
     pub image_size_px: [usize; 2],
 }
 
+impl Document for Correct {
+    const SCHEMA: &'static str = "truedepth.correct/1";
+}
+
 impl Correct {
     /// What was done to `recording` by `plan`, which the faults among `findings` asked for.
     pub fn new(
         recording: &Recording,
         plan: &Plan,
         done: Corrected,
-        findings: Vec<FindingInfo>,
+        findings: Vec<Finding>,
     ) -> Self {
         let previous = done.previous.as_ref().map(|bytes| {
             let text = String::from_utf8_lossy(bytes);
@@ -71,7 +72,6 @@ impl Correct {
         });
         Self {
             recording: recording.name.clone(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
             input_sha256: done.input_sha256,
             steps: plan.steps().to_vec(),
             lens: plan.camera().map(|camera| Distortion::from(&camera.distortion)),
@@ -95,30 +95,5 @@ impl From<&Intrinsics> for PinholeInfo {
             principal_point_px: [k.cx, k.cy],
             image_size_px: [k.width, k.height],
         }
-    }
-}
-
-impl Audit {
-    /// The findings that are faults.
-    pub fn faults(&self) -> impl Iterator<Item = &FindingInfo> {
-        self.findings.iter().filter(|f| f.severity == Verdict::Fault.name())
-    }
-
-    /// The plan that this audit calls for.
-    ///
-    /// Errors: a finding of a newer version, a camera that cannot be, a fault that names no way back.
-    pub fn plan(&self, selection: Selection<'_>) -> Result<Plan, Error> {
-        let has_tables = self.device.factory.as_ref().is_some_and(|factory| factory.has_tables);
-        let own = self.calibration.as_ref().filter(|_| !has_tables);
-        let camera = own.map(|c| c.camera()).transpose()?;
-        let mut found = Vec::new();
-        for finding in &self.findings {
-            let Some(defect) = finding.defect else { continue };
-            let code: Code = finding.code.parse().map_err(|e| Error::Document(format!("{e}")))?;
-            let is_fault = finding.severity == Verdict::Fault.name();
-            found.push((code, if is_fault { Verdict::Fault } else { Verdict::Info }, defect));
-        }
-        Plan::of_findings(found, camera.as_ref(), selection)
-            .map_err(|e| Error::Document(e.to_string()))
     }
 }

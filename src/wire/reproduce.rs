@@ -1,18 +1,16 @@
 //! The paper, reproduced.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
-use super::{Compare, PairInfo, TreatmentsInfo, finite};
+use super::{Compare, Document, PairInfo};
 use crate::{
     diagnose::{Registry, pairs},
-    reproduce::{Check, Reproduction},
+    reproduce::{Check, Missing, Reproduction},
 };
 
-/// Every number of the paper that could be computed again.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// Every number of the paper that could be computed again: what `truedepth reproduce --json` prints.
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Reproduce {
-    /// Version of truedepth.
-    pub version: String,
     /// The recordings it was made from.
     pub data: Vec<DataInfo>,
     /// Printed numbers beside ours.
@@ -22,11 +20,11 @@ pub struct Reproduce {
     /// Both APIs of each device of the paper's tables.
     pub pairs: Vec<PairInfo>,
     /// What is not here.
-    pub missing: Vec<MissingInfo>,
+    pub missing: Vec<Missing>,
 }
 
 /// A recording of the published data.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DataInfo {
     /// Its name.
     pub recording: String,
@@ -41,7 +39,7 @@ pub struct DataInfo {
 }
 
 /// Numbers that belong together.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SectionInfo {
     /// `equations`, `focal`, `depth`, `devices`, `recorded` or `lens`.
     pub id: String,
@@ -52,7 +50,7 @@ pub struct SectionInfo {
 }
 
 /// A printed number beside ours.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CheckInfo {
     /// What it is.
     pub what: String,
@@ -75,25 +73,20 @@ pub struct CheckInfo {
 }
 
 /// Straightness of one recording.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LensInfo {
     /// Its name.
     pub recording: String,
     /// `tables` or `camera`.
     pub lens: String,
-    /// `straight`, `distorted`, `rectified_twice` or `unknown`.
+    /// `rectified`, `distorted`, `rectified_twice` or `unknown`.
     pub state: String,
-    /// Distance of corners from straight lines.
-    pub rms_px: Option<TreatmentsInfo>,
+    /// Distance of corners from straight lines: as recorded, with the forward table, with the inverse table.
+    pub rms_px: Option<[f64; 3]>,
 }
 
-/// Something that is not here.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct MissingInfo {
-    /// What.
-    pub what: String,
-    /// How to get it.
-    pub how: String,
+impl Document for Reproduce {
+    const SCHEMA: &'static str = "truedepth.reproduce/1";
 }
 
 impl From<&Check> for CheckInfo {
@@ -102,9 +95,9 @@ impl From<&Check> for CheckInfo {
             what: check.what.clone(),
             printed: check.printed.map(|p| p.value),
             decimals: check.printed.map(|p| p.decimals),
-            ours: check.ours.and_then(|ours| finite(ours.value)),
-            sigma: check.ours.and_then(|ours| finite(ours.sigma)).filter(|sigma| *sigma > 0.0),
-            difference: check.difference().and_then(finite),
+            ours: check.ours.map(|ours| ours.value),
+            sigma: check.ours.map(|ours| ours.sigma).filter(|sigma| *sigma > 0.0),
+            difference: check.difference(),
             unit: check.unit.to_owned(),
             status: check.status.name().to_owned(),
             note: (!check.note.is_empty()).then(|| check.note.clone()),
@@ -115,7 +108,6 @@ impl From<&Check> for CheckInfo {
 impl From<&Reproduction> for Reproduce {
     fn from(paper: &Reproduction) -> Self {
         Self {
-            version: env!("CARGO_PKG_VERSION").to_owned(),
             data: paper
                 .data
                 .iter()
@@ -143,15 +135,11 @@ impl From<&Reproduction> for Reproduce {
                     recording: paper.data[lens.data].recording.name.clone(),
                     lens: lens.rectifier.name().to_owned(),
                     state: lens.straightness.state().name().to_owned(),
-                    rms_px: lens.straightness.rms_px().map(TreatmentsInfo::from),
+                    rms_px: lens.straightness.rms_px(),
                 })
                 .collect(),
             pairs: Compare::new(&pairs(&Registry::published())).pairs,
-            missing: paper
-                .missing
-                .iter()
-                .map(|m| MissingInfo { what: m.what.clone(), how: m.how.clone() })
-                .collect(),
+            missing: paper.missing.clone(),
         }
     }
 }

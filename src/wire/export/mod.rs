@@ -14,7 +14,7 @@
 //!
 //! ```
 //! use truedepth::camera::{Brown, Camera, Distortion, Intrinsics};
-//! use truedepth::export::{Format, calibration};
+//! use truedepth::wire::export::{Format, calibration};
 //!
 //! let intrinsics = Intrinsics { fx: 530.0, fy: 530.0, cx: 320.5, cy: 241.25, width: 640, height: 480 };
 //! let camera = Camera { intrinsics, distortion: Distortion::Brown(Brown { k1: 0.07, ..Brown::ZERO }) };
@@ -25,7 +25,7 @@
 //! ```
 //!
 //! Not here: point clouds and images; files (the caller writes the text); this project's own JSON
-//! ([`report`](crate::report)).
+//! ([`wire`](crate::wire)).
 
 mod lens;
 mod text;

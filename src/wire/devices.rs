@@ -1,20 +1,18 @@
 //! What metadata alone tell: of one recording, of two, and of the registry.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
-use super::{DeviceInfo, FindingInfo, finite};
+use super::{DeviceInfo, Document};
 use crate::{
-    diagnose::{self, AcrossApis, Inspection, KnownIssue, Side},
+    diagnose::{self, AcrossApis, Finding, Inspection, KnownIssue, Side},
     recording::Recording,
 };
 
-/// What the metadata of a recording tell.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// What the metadata of a recording tell: what `truedepth inspect --json` prints.
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Inspect {
     /// Name of the recording.
     pub recording: String,
-    /// Version of truedepth.
-    pub version: String,
     /// The camera.
     pub device: DeviceInfo,
     /// Which known device it is; `null` where the metadata have no reference dimensions.
@@ -26,11 +24,11 @@ pub struct Inspect {
     /// What was odd in the files, in words.
     pub problems: Vec<String>,
     /// By code.
-    pub findings: Vec<FindingInfo>,
+    pub findings: Vec<Finding>,
 }
 
 /// Which known device it is.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct IdentityInfo {
     /// `unknown`, `sensor_only`, `camera` or `unit`.
     pub certainty: String,
@@ -45,7 +43,7 @@ pub struct IdentityInfo {
 }
 
 /// Factory parameters at the reference dimensions.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct SheetInfo {
     /// `intrinsicMatrixReferenceDimensions`.
     pub reference_dimensions_px: [f64; 2],
@@ -67,17 +65,15 @@ pub struct SheetInfo {
     pub color_principal_point_px: Option<[f64; 2]>,
 }
 
-/// Two sets of factory parameters.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// Two sets of factory parameters: what `truedepth compare --json` prints.
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Compare {
-    /// Version of truedepth.
-    pub version: String,
     /// One per pair: one for two given sides, ten for all of the paper.
     pub pairs: Vec<PairInfo>,
 }
 
 /// One pair.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PairInfo {
     /// AVFoundation's, or the first.
     pub first: SideInfo,
@@ -92,11 +88,11 @@ pub struct PairInfo {
     /// Both corrections of the paper; `null` for two sides of one API.
     pub corrections: Option<PairCorrections>,
     /// TD205 or TD502.
-    pub findings: Vec<FindingInfo>,
+    pub findings: Vec<Finding>,
 }
 
 /// One side of a pair.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SideInfo {
     /// Name in the registry, or of the recording or file.
     pub name: String,
@@ -107,7 +103,7 @@ pub struct SideInfo {
 }
 
 /// The paper's corrections; each is meant for its own issue only.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PairCorrections {
     /// Issue 1: for ARKit's depth maps, about the principal point; horizontally and vertically.
     pub depth_zoom: [f64; 2],
@@ -121,18 +117,25 @@ pub struct PairCorrections {
     pub ar_focal_at_640_px: f64,
 }
 
+impl Document for Inspect {
+    const SCHEMA: &'static str = "truedepth.inspect/1";
+}
+
+impl Document for Compare {
+    const SCHEMA: &'static str = "truedepth.compare/1";
+}
+
 impl Inspect {
     /// What was found of a recording.
     pub fn new(recording: &Recording, inspection: &Inspection<'_>) -> Self {
         Self {
             recording: recording.name.clone(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
             device: DeviceInfo::new(&inspection.device, recording.factory()),
             identity: inspection.identity.as_ref().map(IdentityInfo::from),
             sheet: inspection.sheet.as_ref().map(SheetInfo::from),
             n_frames: recording.frames.len(),
             problems: recording.problems.iter().map(ToString::to_string).collect(),
-            findings: inspection.findings.iter().map(FindingInfo::from).collect(),
+            findings: inspection.findings.clone(),
         }
     }
 }
@@ -149,7 +152,7 @@ impl From<&diagnose::Identity<'_>> for IdentityInfo {
             certainty: identity.certainty.name().to_owned(),
             matches: identity.matches.iter().map(|entry| entry.name()).collect(),
             products,
-            focal_difference_percent: identity.focal_difference.and_then(|d| finite(100.0 * d)),
+            focal_difference_percent: identity.focal_difference.map(|d| 100.0 * d),
             known_issues: identity.issues.iter().map(|issue| issue.name().to_owned()).collect(),
         }
     }
@@ -184,8 +187,7 @@ impl From<&Side> for SideInfo {
 impl Compare {
     /// These pairs.
     pub fn new(pairs: &[diagnose::Comparison]) -> Self {
-        let version = env!("CARGO_PKG_VERSION").to_owned();
-        Self { version, pairs: pairs.iter().map(PairInfo::from).collect() }
+        Self { pairs: pairs.iter().map(PairInfo::from).collect() }
     }
 }
 
@@ -208,7 +210,7 @@ impl From<&diagnose::Comparison> for PairInfo {
                 .map(|i| 100.0 * (b.reference[i] / a.reference[i] - 1.0)),
             issue: issue.map(|issue: KnownIssue| issue.name().to_owned()),
             corrections,
-            findings: pair.findings.iter().map(FindingInfo::from).collect(),
+            findings: pair.findings.clone(),
         }
     }
 }
