@@ -15,7 +15,7 @@ use crate::{
     detect::Corner,
     geom::{Board, Color, Matrix3, Pixel, Pose, Vector3},
     math, pose,
-    solve::{BlockNormal, Bordered, LANES, Loss, MAX_PARAMETERS, Rows, Sums, Totals, sum},
+    solve::{BlockNormal, Bordered, LANES, Loss, MAX_PARAMETERS, NormalParts, Rows, Sums, sum},
 };
 
 /// One view as the solver sees it.
@@ -220,9 +220,8 @@ fn gather<I: Simd, T>(simd: I, items: &[T], number: impl Fn(&T) -> f64) -> f64x8
     )
 }
 
-/// The normal equations of a view, of as many parameters as there are.
+/// What a view says beside its normal equations.
 struct ViewSums {
-    totals: Totals,
     /// Half the (robust) sum of squares.
     half_rho: f64,
     /// For each corner, where heights are free, by its height: the other parameters' products, its own, and the
@@ -258,8 +257,7 @@ impl Reprojection<'_> {
             n_own: B,
             n_shared: shared.len(),
         };
-        let Some(sums) = view.sums(pose) else { return false };
-        sums.totals.add_to(normal);
+        let Some(sums) = view.add(pose, &mut normal.parts()) else { return false };
         normal.add_cost(sums.half_rho);
         let corners = &self.views[index].corners;
         if !knots_m.is_empty() {
@@ -306,13 +304,18 @@ struct ReadyView<'a> {
 }
 
 impl ReadyView<'_> {
-    /// `None` outside the problem's domain.
-    fn sums(&self, pose: &Pose<Color, Board>) -> Option<ViewSums> {
-        dispatch!(Level::new(), simd => self.sums_of(simd, pose))
+    /// Adds to normal equations; `None`, and nothing added, outside the problem's domain.
+    fn add(&self, pose: &Pose<Color, Board>, normal: &mut NormalParts<'_>) -> Option<ViewSums> {
+        dispatch!(Level::new(), simd => self.add_lanes(simd, pose, normal))
     }
 
     #[inline(always)]
-    fn sums_of<I: Simd>(&self, simd: I, pose: &Pose<Color, Board>) -> Option<ViewSums> {
+    fn add_lanes<I: Simd>(
+        &self,
+        simd: I,
+        pose: &Pose<Color, Board>,
+        normal: &mut NormalParts<'_>,
+    ) -> Option<ViewSums> {
         let Self { ready, view, knots_m, sheet, .. } = self;
         let m = pose.rotation.matrix();
         let n_parameters = self.n_own + self.n_shared;
@@ -393,7 +396,8 @@ impl ReadyView<'_> {
                 }
             }
         }
-        Some(ViewSums { totals: sums.total(), half_rho: 0.5 * sum(cost), by_height })
+        sums.add_to(normal);
+        Some(ViewSums { half_rho: 0.5 * sum(cost), by_height })
     }
 }
 

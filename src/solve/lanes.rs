@@ -5,7 +5,7 @@
 
 use fearless_simd::{Simd, f64x8, prelude::*};
 
-use super::{BlockNormal, MAX_SHARED};
+use super::MAX_SHARED;
 
 /// So many residuals lie side by side.
 pub(crate) const LANES: usize = 8;
@@ -22,12 +22,13 @@ pub(crate) struct Rows<I: Simd> {
     pub(crate) derivatives: [f64x8<I>; MAX_PARAMETERS],
 }
 
-/// What goes to a [`BlockNormal`] in the end: eight sums of each of its numbers, whose order of addition is the same on
-/// every processor.
+/// What goes to a [`BlockNormal`](super::BlockNormal) in the end: eight sums of each of its numbers, whose order of
+/// addition is the same on every processor.
 pub(crate) struct Sums<I: Simd> {
     /// The lower triangle, row by row.
     products: Vec<f64x8<I>>,
-    right: Vec<f64x8<I>>,
+    right: [f64x8<I>; MAX_PARAMETERS],
+    n: usize,
 }
 
 impl<I: Simd> Sums<I> {
@@ -35,57 +36,68 @@ impl<I: Simd> Sums<I> {
     #[inline(always)]
     pub(crate) fn zero(simd: I, n: usize) -> Self {
         let zero = f64x8::splat(simd, 0.0);
-        Self { products: vec![zero; n * (n + 1) / 2], right: vec![zero; n] }
+        Self { products: vec![zero; n * (n + 1) / 2], right: [zero; MAX_PARAMETERS], n }
     }
 
     /// Both coordinates of eight pixels.
     #[inline(always)]
     pub(crate) fn add(&mut self, [a, b]: &[Rows<I>; 2]) {
         let mut rest = &mut self.products[..];
-        for (i, right) in self.right.iter_mut().enumerate() {
-            let (wa, wb) = (a.weight * a.derivatives[i], b.weight * b.derivatives[i]);
+        let weighted = |i: usize| (a.weight * a.derivatives[i], b.weight * b.derivatives[i]);
+        // Two rows of the triangle at a time: derivatives are loaded once for both.
+        for i in (0..self.n - self.n % 2).step_by(2) {
+            let ((wa, wb), (va, vb)) = (weighted(i), weighted(i + 1));
             let (row, below) = rest.split_at_mut(i + 1);
-            for ((sum, da), db) in row.iter_mut().zip(&a.derivatives).zip(&b.derivatives) {
+            let (next, below) = below.split_at_mut(i + 2);
+            let derivatives = a.derivatives.iter().zip(&b.derivatives);
+            for ((sum, next), (da, db)) in row.iter_mut().zip(&mut *next).zip(derivatives) {
                 *sum += wa * *da + wb * *db;
+                *next += va * *da + vb * *db;
             }
-            *right += wa * a.residual + wb * b.residual;
+            next[i + 1] += va * a.derivatives[i + 1] + vb * b.derivatives[i + 1];
+            self.right[i] += wa * a.residual + wb * b.residual;
+            self.right[i + 1] += va * a.residual + vb * b.residual;
             rest = below;
         }
-    }
-
-    /// The sums over all lanes.
-    #[inline(always)]
-    pub(crate) fn total(&self) -> Totals {
-        Totals {
-            products: self.products.iter().map(|s| sum(*s)).collect(),
-            right: self.right.iter().map(|s| sum(*s)).collect(),
+        if let (Some(i), false) = (self.n.checked_sub(1), self.n.is_multiple_of(2)) {
+            let (wa, wb) = weighted(i);
+            for ((sum, da), db) in rest.iter_mut().zip(&a.derivatives).zip(&b.derivatives) {
+                *sum += wa * *da + wb * *db;
+            }
+            self.right[i] += wa * a.residual + wb * b.residual;
         }
     }
-}
 
-/// What [`Sums`] come to: the lower triangle row by row, and the right-hand side.
-pub(crate) struct Totals {
-    products: Vec<f64>,
-    right: Vec<f64>,
-}
-
-impl Totals {
+    /// Adds the sums over all lanes.
+    ///
     /// Panics where they are of another number of parameters.
-    pub(crate) fn add_to<const B: usize>(&self, normal: &mut BlockNormal<B>) {
-        let n_shared = normal.n_shared();
-        assert_eq!(self.right.len(), B + n_shared, "parameters");
+    #[inline(always)]
+    pub(crate) fn add_to(&self, normal: &mut NormalParts<'_>) {
+        let (n_block, n_shared) = (normal.h.len(), normal.g.len());
+        assert_eq!(self.n, n_block + n_shared, "parameters");
         let mut products = self.products.iter();
-        for (i, row) in normal.v.iter_mut().enumerate() {
-            row[..=i].iter_mut().zip(&mut products).for_each(|(sum, product)| *sum += product);
+        let mut add = |to: &mut [f64]| {
+            to.iter_mut().zip(&mut products).for_each(|(to, lanes)| *to += sum(*lanes));
+        };
+        for i in 0..n_block {
+            add(&mut normal.v[i * n_block..][..=i]);
         }
-        for (i, by_block) in normal.w.iter_mut().enumerate() {
-            let by_shared = &mut normal.u[i * n_shared..=i * n_shared + i];
-            let row = by_block.iter_mut().chain(by_shared);
-            row.zip(&mut products).for_each(|(sum, product)| *sum += product);
+        for i in 0..n_shared {
+            add(&mut normal.w[i * n_block..][..n_block]);
+            add(&mut normal.u[i * n_shared..][..=i]);
         }
-        let right = normal.h.iter_mut().chain(&mut normal.g);
-        right.zip(&self.right).for_each(|(sum, product)| *sum += product);
+        let right = normal.h.iter_mut().chain(&mut *normal.g);
+        right.zip(&self.right).for_each(|(to, lanes)| *to += sum(*lanes));
     }
+}
+
+/// The numbers of a [`BlockNormal`](super::BlockNormal), whatever the number of its parameters; matrices row by row.
+pub(crate) struct NormalParts<'a> {
+    pub(super) u: &'a mut [f64],
+    pub(super) w: &'a mut [f64],
+    pub(super) v: &'a mut [f64],
+    pub(super) g: &'a mut [f64],
+    pub(super) h: &'a mut [f64],
 }
 
 /// The sum of all lanes.

@@ -61,7 +61,7 @@ mod covariance;
 
 pub use cholesky::{Cholesky, DenseCholesky};
 pub use covariance::{LeftOut, Pooled, covariance_of, larger, total, units};
-pub(crate) use lanes::{LANES, MAX_PARAMETERS, Rows, Sums, Totals, sum};
+pub(crate) use lanes::{LANES, MAX_PARAMETERS, NormalParts, Rows, Sums, sum};
 pub use lm::{Effort, LeastSquares, Minimum, Solution, minimize};
 pub use loss::Loss;
 pub use mixture::Mixture;

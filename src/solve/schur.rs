@@ -5,7 +5,7 @@
     reason = "index loops over small matrices read as the formulas do"
 )]
 
-use super::{Cholesky, DenseCholesky, LeastSquares, Solution};
+use super::{Cholesky, DenseCholesky, LeastSquares, NormalParts, Solution};
 use crate::par::vectorized;
 
 /// So many parameters can be shared.
@@ -131,6 +131,16 @@ impl<const B: usize> BlockNormal<B> {
     /// How many parameters are shared.
     pub fn n_shared(&self) -> usize {
         self.g.len()
+    }
+
+    pub(crate) fn parts(&mut self) -> NormalParts<'_> {
+        NormalParts {
+            u: &mut self.u,
+            w: self.w.as_flattened_mut(),
+            v: self.v.as_flattened_mut(),
+            g: &mut self.g,
+            h: &mut self.h,
+        }
     }
 
     /// Adds a residual that depends on the shared parameters, too. The cost is added apart, by
