@@ -205,8 +205,11 @@ pub(super) const MOTION_SIGMA: [f64; 6] = [4e-3, 4e-3, 4e-3, 2e-3, 2e-3, 2e-3];
 /// Eight points after a rotation.
 #[inline(always)]
 fn rotated<I: Simd>(m: &Matrix3<f64>, [x, y, z]: [f64x8<I>; 3]) -> [f64x8<I>; 3] {
-    let row = |r: usize| x * m[(r, 0)] + y * m[(r, 1)] + z * m[(r, 2)];
-    [row(0), row(1), row(2)]
+    [
+        x * m[(0, 0)] + y * m[(0, 1)] + z * m[(0, 2)],
+        x * m[(1, 0)] + y * m[(1, 1)] + z * m[(1, 2)],
+        x * m[(2, 0)] + y * m[(2, 1)] + z * m[(2, 2)],
+    ]
 }
 
 /// A number of each of up to eight items; lanes beyond the last are that one again.
@@ -338,7 +341,9 @@ impl ReadyView<'_> {
             let mut place = [x, y, gather(simd, points, |p| p.z)];
             let by_surface = sheet.by_shared(self.surface, [x, y]);
             for (by, number) in by_surface.iter().zip(self.surface_numbers) {
-                (0..3).for_each(|k| place[k] += by[k] * *number);
+                for k in 0..3 {
+                    place[k] += by[k] * *number;
+                }
             }
             if !knots_m.is_empty() {
                 place[2] += gather(simd, corners, |c| sheet.height_m(c.id, knots_m));
@@ -372,7 +377,9 @@ impl ReadyView<'_> {
                 let (own, shared) = row.derivatives.split_at_mut(self.n_own);
                 let (still, moving) = own.split_at_mut(POSE);
                 still.copy_from_slice(&by_pose);
-                moving.iter_mut().zip(by_pose).for_each(|(by, by_pose)| *by = time * by_pose);
+                for (by, by_pose) in moving.iter_mut().zip(by_pose) {
+                    *by = time * by_pose;
+                }
                 for (derivative, by) in shared[n_camera..self.n_shared].iter_mut().zip(by_surface) {
                     let [x, y, z] = rotated(m, by);
                     *derivative = a * x + b * y + c * z;
@@ -380,9 +387,9 @@ impl ReadyView<'_> {
             }
             sums.add(&rows);
             if !knots_m.is_empty() {
-                let along =
-                    |[a, b, c]: [f64x8<I>; 3]| a * m[(0, 2)] + b * m[(1, 2)] + c * m[(2, 2)];
-                let by_itself = [along(drawn.by_point[0]), along(drawn.by_point[1])];
+                let [[a, b, c], [d, e, f]] = drawn.by_point;
+                let [x, y, z] = [m[(0, 2)], m[(1, 2)], m[(2, 2)]];
+                let by_itself = [a * x + b * y + c * z, d * x + e * y + f * z];
                 let [wa, wb] = [weight * by_itself[0], weight * by_itself[1]];
                 let [a, b] = &rows;
                 let mut products = [zero; MAX_PARAMETERS + 2];

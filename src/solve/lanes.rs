@@ -22,6 +22,14 @@ pub(crate) struct Rows<I: Simd> {
     pub(crate) derivatives: [f64x8<I>; MAX_PARAMETERS],
 }
 
+// What is inlined into vectors is a function, as a closure bound to a name cannot be `#[inline(always)]`.
+impl<I: Simd> Rows<I> {
+    #[inline(always)]
+    fn weighted(&self, i: usize) -> f64x8<I> {
+        self.weight * self.derivatives[i]
+    }
+}
+
 /// What goes to a [`BlockNormal`](super::BlockNormal) in the end: eight sums of each of its numbers, whose order of
 /// addition is the same on every processor.
 pub(crate) struct Sums<I: Simd> {
@@ -43,10 +51,10 @@ impl<I: Simd> Sums<I> {
     #[inline(always)]
     pub(crate) fn add(&mut self, [a, b]: &[Rows<I>; 2]) {
         let mut rest = &mut self.products[..];
-        let weighted = |i: usize| (a.weight * a.derivatives[i], b.weight * b.derivatives[i]);
         // Two rows of the triangle at a time: derivatives are loaded once for both.
         for i in (0..self.n - self.n % 2).step_by(2) {
-            let ((wa, wb), (va, vb)) = (weighted(i), weighted(i + 1));
+            let [wa, va] = [a.weighted(i), a.weighted(i + 1)];
+            let [wb, vb] = [b.weighted(i), b.weighted(i + 1)];
             let (row, below) = rest.split_at_mut(i + 1);
             let (next, below) = below.split_at_mut(i + 2);
             let derivatives = a.derivatives.iter().zip(&b.derivatives);
@@ -60,7 +68,7 @@ impl<I: Simd> Sums<I> {
             rest = below;
         }
         if let (Some(i), false) = (self.n.checked_sub(1), self.n.is_multiple_of(2)) {
-            let (wa, wb) = weighted(i);
+            let (wa, wb) = (a.weighted(i), b.weighted(i));
             for ((sum, da), db) in rest.iter_mut().zip(&a.derivatives).zip(&b.derivatives) {
                 *sum += wa * *da + wb * *db;
             }
@@ -76,18 +84,24 @@ impl<I: Simd> Sums<I> {
         let (n_block, n_shared) = (normal.h.len(), normal.g.len());
         assert_eq!(self.n, n_block + n_shared, "parameters");
         let mut products = self.products.iter();
-        let mut add = |to: &mut [f64]| {
-            to.iter_mut().zip(&mut products).for_each(|(to, lanes)| *to += sum(*lanes));
-        };
         for i in 0..n_block {
-            add(&mut normal.v[i * n_block..][..=i]);
+            add_sums(&mut normal.v[i * n_block..][..=i], &mut products);
         }
         for i in 0..n_shared {
-            add(&mut normal.w[i * n_block..][..n_block]);
-            add(&mut normal.u[i * n_shared..][..=i]);
+            add_sums(&mut normal.w[i * n_block..][..n_block], &mut products);
+            add_sums(&mut normal.u[i * n_shared..][..=i], &mut products);
         }
-        let right = normal.h.iter_mut().chain(&mut *normal.g);
-        right.zip(&self.right).for_each(|(to, lanes)| *to += sum(*lanes));
+        let mut right = self.right.iter();
+        add_sums(normal.h, &mut right);
+        add_sums(normal.g, &mut right);
+    }
+}
+
+/// Adds the sum of the next lanes to each number.
+#[inline(always)]
+fn add_sums<I: Simd>(to: &mut [f64], lanes: &mut std::slice::Iter<'_, f64x8<I>>) {
+    for (to, lanes) in to.iter_mut().zip(lanes) {
+        *to += sum(*lanes);
     }
 }
 
