@@ -158,7 +158,7 @@ pub fn correct_observed<O: Output>(
         } else if recording.images().is_image(name) {
             left_out.push(name.to_owned());
         } else {
-            files::copy(name, recording.open_file(name)?, output, name)?;
+            files::copy(recording.open_file(name)?, output, name)?;
         }
     }
     let files: Vec<FileHash> = names
@@ -320,10 +320,9 @@ impl<'a> Corrector<'a> {
     fn frame(&self, index: usize, t_ms: i64) -> Result<Vec<Done>, Error> {
         let (recording, plan) = (self.recording, self.plan);
         let is_ours = recording.images().stores_as_ours();
-        let has_files = !recording.file_names().is_empty();
         let source = &recording.frames[index];
         let read = |image: &FrameImage| -> Result<Option<Vec<u8>>, Error> {
-            Ok(if has_files { Some(recording.file(&image.file)?) } else { None })
+            Ok(if recording.has_files() { Some(recording.file(&image.file)?) } else { None })
         };
         let hashed = |image: &FrameImage, bytes: &Option<Vec<u8>>| {
             bytes.as_ref().map(|bytes| (image.file.clone(), Sha256::digest(bytes).into()))

@@ -5,7 +5,7 @@ use fearless_simd::{Level, Simd, dispatch, f64x8, prelude::*};
 use super::{CornerDepth, Lattice, Texture};
 use crate::{
     board::CharucoBoard,
-    detect::Corner,
+    detect::{Corner, cells_and_pixels},
     geom::{Homography, Pixel},
     image::DepthMap,
     solve::{LANES, median, sum},
@@ -86,14 +86,7 @@ pub fn patches(map: &DepthMap, board: &CharucoBoard, corners: &[Corner]) -> Opti
     if corners.len() < 6 {
         return None;
     }
-    let cells: Vec<Pixel> = corners
-        .iter()
-        .map(|corner| {
-            let (column, row) = board.corner_cell(corner.id);
-            Pixel::new(column as f64 + 1.0, row as f64 + 1.0)
-        })
-        .collect();
-    let pixels: Vec<Pixel> = corners.iter().map(|corner| corner.pixel).collect();
+    let [cells, pixels] = cells_and_pixels(board, corners);
     let pixel_from_cell = Homography::from_points(&cells, &pixels)?;
     let cell_from_pixel = Homography::from_points(&pixels, &cells)?;
     let (right, bottom) = (board.squares_x as f64, board.squares_y as f64);

@@ -41,7 +41,10 @@ mod window;
 pub use detector::Detector;
 pub use trace::Trace;
 
-use crate::{board::Layout, geom::Pixel};
+use crate::{
+    board::{CharucoBoard, Layout},
+    geom::Pixel,
+};
 
 /// What was seen of a board in one image.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -53,6 +56,15 @@ pub struct Observation {
     /// Candidates that were not taken, with the reason.
     #[serde(rename = "rejected")]
     pub rejects: Vec<Reject>,
+}
+
+/// Where corners lie on the board, in squares from its outer corner, and in the image.
+pub(crate) fn cells_and_pixels(board: &CharucoBoard, corners: &[Corner]) -> [Vec<Pixel>; 2] {
+    let cell = |corner: &Corner| {
+        let (column, row) = board.corner_cell(corner.id);
+        Pixel::new(column as f64 + 1.0, row as f64 + 1.0)
+    };
+    [corners.iter().map(cell).collect(), corners.iter().map(|corner| corner.pixel).collect()]
 }
 
 /// One inner corner of the board.

@@ -91,16 +91,6 @@ impl<'a> Case<'a> {
 }
 
 impl Case<'_> {
-    /// Frames in which the board was seen.
-    pub(super) fn n_seen(&self) -> usize {
-        self.n_seen
-    }
-
-    /// Frames whose markers read only as in a mirror, and all whose markers read.
-    pub(super) fn n_mirrored_of(&self) -> (usize, usize) {
-        self.n_mirrored_of
-    }
-
     /// Why nothing that rests on the own calibration is to be judged, for the end of a sentence; `None` where it fits.
     pub(super) fn poor_fit(&self) -> Option<String> {
         let rms_px = self.calibration?.rms_px;
@@ -117,7 +107,7 @@ impl Case<'_> {
     pub(super) fn why_no_camera(&self) -> String {
         match self.no_calibration {
             Some(why) => why.to_owned(),
-            None if self.n_seen() == 0 => "the board was not seen in any frame".to_owned(),
+            None if self.n_seen == 0 => "the board was not seen in any frame".to_owned(),
             None => "the recording does not determine the camera".to_owned(),
         }
     }

@@ -35,7 +35,7 @@ fn measured(case: &Case<'_>, state: StreamState) -> Option<[Estimate; 2]> {
 fn expected(case: &Case<'_>, own: [Estimate; 2]) -> Option<([f64; 2], bool)> {
     let Intrinsics { cx, cy, width, .. } = case.factory?.intrinsics;
     let mirrored_x = width as f64 - 1.0 - cx;
-    let (mirrored, n) = case.n_mirrored_of();
+    let (mirrored, n) = case.n_mirrored_of;
     let off = |x: f64| (own[0].value - x).abs();
     if 2 * mirrored > n && off(mirrored_x) < off(cx) {
         Some(([mirrored_x, cy], true))

@@ -10,7 +10,7 @@ pub(super) const CHECK: Check =
 
 pub(super) fn check(case: &Case<'_>, _: &Known) -> Finding {
     let mut finding = Finding::new(Code::TD403, &case.tolerances);
-    let (mirrored, n) = case.n_mirrored_of();
+    let (mirrored, n) = case.n_mirrored_of;
     if n == 0 {
         finding.show("", "—");
         let claim =

@@ -86,17 +86,10 @@ impl<O: Output + ?Sized> Output for &mut O {
     }
 }
 
-/// Copies a file that is called `from` in messages into an output, piece by piece.
-pub fn copy(
-    from: &str,
-    mut reader: impl Read,
-    output: &mut dyn Output,
-    name: &str,
-) -> Result<(), Error> {
+/// Copies a file into an output under its name, piece by piece.
+pub fn copy(reader: impl Read, output: &mut dyn Output, name: &str) -> Result<(), Error> {
     let mut file = output.create(name)?;
-    each_piece(from, &mut reader, &mut |bytes| {
-        file.write_all(bytes).map_err(|e| Error::io(name, &e))
-    })?;
+    each_piece(name, reader, &mut |bytes| file.write_all(bytes).map_err(|e| Error::io(name, &e)))?;
     file.flush().map_err(|e| Error::io(name, &e))
 }
 

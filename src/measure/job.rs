@@ -113,13 +113,11 @@ pub fn measure(
     }
     let mut measurer = Measurer::new(&board);
     let indices: Vec<usize> = (0..total).collect();
-    let done = AtomicUsize::new(0);
-    observer.progress(Progress { stage: Stage::Detect, done: 0, total });
+    let steps = Steps::new(observer, total);
     for batch in indices.chunks(BATCH) {
         let found = par::try_map(batch, |&index| {
             let found = look(recording, &measurer, index, observer)?;
-            let done = 1 + done.fetch_add(1, Ordering::Relaxed);
-            observer.progress(Progress { stage: Stage::Detect, done, total });
+            steps.one_done();
             Ok::<_, Error>(found)
         })?;
         found.into_iter().for_each(|found| measurer.add(found));
@@ -138,14 +136,11 @@ pub fn look_for_board<E>(
 ) -> Result<(), E> {
     let with_color = |index: &usize| recording.frames[*index].color.is_some();
     let indices: Vec<usize> = (0..recording.frames.len()).filter(with_color).collect();
-    let total = indices.len();
-    let done = AtomicUsize::new(0);
-    observer.progress(Progress { stage: Stage::Detect, done: 0, total });
+    let steps = Steps::new(observer, indices.len());
     for batch in indices.chunks(BATCH) {
         let found = par::map(batch, |&index| {
             let found = look_at_color(recording, measurer, index, observer);
-            let done = 1 + done.fetch_add(1, Ordering::Relaxed);
-            observer.progress(Progress { stage: Stage::Detect, done, total });
+            steps.one_done();
             found
         });
         for (index, found) in batch.iter().zip(found) {
@@ -153,6 +148,25 @@ pub fn look_for_board<E>(
         }
     }
     Ok(())
+}
+
+/// Counts frames that were looked at, from any thread.
+struct Steps<'a> {
+    observer: &'a dyn Observer,
+    done: AtomicUsize,
+    total: usize,
+}
+
+impl<'a> Steps<'a> {
+    fn new(observer: &'a dyn Observer, total: usize) -> Self {
+        observer.progress(Progress { stage: Stage::Detect, done: 0, total });
+        Self { observer, done: AtomicUsize::new(0), total }
+    }
+
+    fn one_done(&self) {
+        let done = 1 + self.done.fetch_add(1, Ordering::Relaxed);
+        self.observer.progress(Progress { stage: Stage::Detect, done, total: self.total });
+    }
 }
 
 /// One colour image: decoded, the corners detected, the image dropped.
@@ -242,7 +256,7 @@ impl Measurer {
         let registration = own
             .camera
             .as_ref()
-            .and_then(|camera| registration(camera, &own, &board, &frames, factory));
+            .and_then(|camera| registration(camera, &own, &board, &frames, &pairs, factory));
         let handedness = (!pairs.is_empty()).then(|| handedness(&board, own.surface(), &pairs));
         drop(pairs);
         let distortion = own.distortion(&about, &board, &frames);
@@ -277,9 +291,9 @@ fn registration(
     own: &MeasuredCamera,
     board: &CharucoBoard,
     frames: &[FrameMeasurement],
+    pairs: &[(&View, &Patches)],
     factory: Option<&Factory>,
 ) -> Option<Registration> {
-    let pairs = own.views_with_depth(frames);
     let scale = pairs.first().and_then(|(view, _)| frames[view.frame].depth_scale());
     let depth_size = pairs.first().and_then(|(view, _)| frames[view.frame].depth_size_px);
     let (parameters, covariance) = own.uncertainty();

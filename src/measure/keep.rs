@@ -3,6 +3,7 @@
 use super::FrameMeasurement;
 use crate::{
     board::CharucoBoard,
+    detect::cells_and_pixels,
     geom::{Homography, Pixel},
 };
 
@@ -46,15 +47,7 @@ impl Keeper {
     }
 
     fn outline(&self, frame: &FrameMeasurement) -> Option<Outline> {
-        let corners = &frame.observation.corners;
-        let cells: Vec<Pixel> = corners
-            .iter()
-            .map(|corner| {
-                let (column, row) = self.board.corner_cell(corner.id);
-                Pixel::new(column as f64 + 1.0, row as f64 + 1.0)
-            })
-            .collect();
-        let pixels: Vec<Pixel> = corners.iter().map(|corner| corner.pixel).collect();
+        let [cells, pixels] = cells_and_pixels(&self.board, &frame.observation.corners);
         let map = Homography::from_points(&cells, &pixels)?;
         let (right, bottom) = (self.board.squares_x as f64, self.board.squares_y as f64);
         let at = |x, y| map.map(Pixel::new(x, y));

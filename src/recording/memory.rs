@@ -100,5 +100,6 @@ mod tests {
         let error = recording.depth(1).expect_err("no depth").to_string();
         assert!(error.contains("no depth image at frame 1"), "{error}");
         assert!(recording.file("x").is_err() && recording.file_names().is_empty());
+        assert!(!recording.has_files());
     }
 }

@@ -221,6 +221,11 @@ impl Recording {
         names
     }
 
+    /// Whether it was read from files; a recording in memory has none.
+    pub fn has_files(&self) -> bool {
+        self.contents.is_some()
+    }
+
     fn contents(&self, name: &str) -> Result<&Contents, Error> {
         let missing = || files::Error::File {
             file: self.path(name),

@@ -14,7 +14,6 @@ use crate::{
     depth::{BoardDepth, FrameDepth, Registration, Sample, TemporalNoise},
     detect::Observation,
     diagnose::{Device, Finding},
-    measure::FrameMeasurement,
     recording::{Factory, StreamState},
 };
 
@@ -217,6 +216,7 @@ impl<'a> Audit<'a> {
     /// Of this audit.
     pub fn new(audit: &'a audit::Audit, detail: Detail) -> Self {
         let factory = audit.factory.as_ref();
+        let (n_mirrored, n_seen) = audit.n_mirrored_of();
         let handedness = audit.handedness.filter(|h| h.n_straight + h.n_mirrored > 0);
         let calibration = audit.calibration.as_ref().map(|calibration| {
             // The views are among the frames.
@@ -234,7 +234,7 @@ impl<'a> Audit<'a> {
             calibration,
             no_calibration: audit.no_calibration.as_deref(),
             depth: Depth::new(audit),
-            mirrored: mirrored(&audit.frames),
+            mirrored: (n_seen > 0).then_some(2 * n_mirrored > n_seen),
             depth_mirrored: handedness.map(|h| h.n_mirrored > h.n_straight),
             distortion_state: audit.distortion_state,
             depth_distortion_state: audit.depth_distortion_state,
@@ -269,17 +269,6 @@ impl<'a> Frame<'a> {
             }),
         }
     }
-}
-
-/// What most views of the board say.
-fn mirrored(frames: &[FrameMeasurement]) -> Option<bool> {
-    let seen: Vec<bool> = frames
-        .iter()
-        .filter_map(|f| f.observation.identity.as_ref())
-        .map(|identity| identity.mirrored)
-        .collect();
-    let n_mirrored = seen.iter().filter(|&&mirrored| mirrored).count();
-    (!seen.is_empty()).then_some(2 * n_mirrored > seen.len())
 }
 
 impl DeviceInfo {

@@ -2,6 +2,7 @@
 
 use std::{
     collections::BTreeMap,
+    convert::Infallible,
     path::{Path, PathBuf},
     sync::{Mutex, PoisonError},
     time::Instant,
@@ -144,9 +145,9 @@ impl Search<'_> {
         let failed = Mutex::new(Vec::new());
         let watch = Watch { bar: Bar(&bar), board, pictures: &pictures, times, failed };
         let mut found = Vec::new();
-        let all = look_for_board(recording, &measurer, &watch, |frame, one| {
+        let Ok(()) = look_for_board(recording, &measurer, &watch, |frame, one| {
             found.push((frame, one.map_err(Failure::from)));
-            Ok::<_, Failure>(())
+            Ok::<_, Infallible>(())
         });
         bar.finish_and_clear();
         self.measurer = Some(measurer);
@@ -173,9 +174,6 @@ impl Search<'_> {
                 }
                 Err(failure) => self.failed(&failure),
             }
-        }
-        if let Err(failure) = all {
-            self.failed(&failure);
         }
     }
 }
